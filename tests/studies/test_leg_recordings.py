@@ -21,7 +21,7 @@ from echostep_studies.legs.recordings import (
     LENGTHS,
     NOTHING,
     SCALE,
-    means,
+    method_means,
     pairs,
     recordings_study,
     rows_of,
@@ -56,7 +56,7 @@ def test_rows_of_a_leg() -> None:
     assert rows[2].walked_m < 11.0
     assert abs(rows[2].error_percent) < 5.0
     assert rows[0].error_over_sd == pytest.approx(rows[0].error_m / rows[0].sd_m, abs=0.02)
-    assert means(rows)[0].error_m == abs(rows[0].error_m)
+    assert method_means(rows)[0]["error_m"] == abs(rows[0].error_m)
 
 
 def test_both_legs_have_rows_of_their_own() -> None:
@@ -67,7 +67,7 @@ def test_both_legs_have_rows_of_their_own() -> None:
     assert [row.known for row in rows] == [known + BOTH for known in (NOTHING, LENGTHS, SCALE)]
     assert {row.recording for row in rows} == {"both"}
     assert rows[0].walked_m == pytest.approx(30.0, abs=0.1)
-    assert means(rows)[0].known == NOTHING + BOTH
+    assert method_means(rows)[0]["known"] == NOTHING + BOTH
 
 
 def test_folders_without_recordings_are_named(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from echostep_studies.noplan.footslam import RADIUS_M, footslam, hexagon
 from echostep_studies.noplan.judgement import closure_columns, known_start, path_columns, wall_columns
 from echostep_studies.noplan.real_clutter import walked_log, with_stated_drift
 from echostep_studies.noplan.sites import furnished, loop_walls
-from echostep_studies.noplan.study import drawn_rows, names_of, noplan_study, one_run, second_row
+from echostep_studies.noplan.study import drawn_names, drawn_rows, names_of, noplan_study, second_row
 from needs_data import needs_data
 from studies.carmen_logs import WALLS as WALLS_OF_LOG
 from studies.carmen_logs import write_log
@@ -168,7 +168,7 @@ def test_rows_without_recordings_and_unknown_rows() -> None:
 def test_a_real_foot_is_drawn(tmp_path: Path) -> None:
     """The surveyed hallway 34, with simulated echoes: nearly all that is drawn is there."""
     assert "feet/34" in names_of(DATA)
-    (row,) = one_run(("feet/34",), DATA, tmp_path, 1, 1)
+    (row,) = drawn_names(DATA, tmp_path, 1, ("feet/34",), 1)
     assert isinstance(row, DrawnRun)
     assert row.rmse_m < 0.5
     assert row.absent < 0.05
@@ -198,7 +198,7 @@ def test_a_log_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "carmen").mkdir()
     write_log(tmp_path / "carmen" / "made.log", WALLS_OF_LOG)
     assert "clutter/made" in names_of(tmp_path)
-    (row,) = one_run(("clutter/made",), tmp_path, tmp_path, 1, 1)
+    (row,) = drawn_names(tmp_path, tmp_path, 1, ("clutter/made",), 1)
     assert isinstance(row, DrawnRun)
     assert row.rmse_m < 0.5
     assert row.storeys == 1

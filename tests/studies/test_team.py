@@ -118,7 +118,7 @@ def test_a_short_team(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(study, "team_walks", on_one_way)
     monkeypatch.setattr(study, "track_team", with_encounter)
-    short = replace(study.team_study("office/tap", 12.0), journal=False)
+    short = replace(study.team_study("office/tap", 12.0), parquet=None)
     run_study(short, StudyRequest(1, 6, tmp_path / "rows.json", tmp_path))
     (row,) = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert set(study.COLUMNS) <= set(row)

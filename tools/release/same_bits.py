@@ -21,9 +21,9 @@ from pathlib import Path
 from echostep_studies.frame.recordings import DATA
 from places import ROOT, TWIN
 
-STUDIES = ("girard2011", "echoes", "trails", "lee2010", "floors", "legs", "storeys", "fischer2008", "feet")
+STUDIES = ("girard2011", "echoes", "noplan", "floors", "legs", "storeys", "fischer2008", "feet")
 WITHOUT_RUNS = ("echoes", "feet")
-WITH_DATA = ("feet", "storeys")
+OPTIONS: dict[str, list[object]] = {"feet": ["--data", DATA], "storeys": ["--data", DATA], "noplan": ["--rows", "trail/*"]}  # fmt: skip
 TIMING = re.compile(r"_ms$|_s_cpu$|core|latency|speed|real_time|pace")  # keys and metrics that are measured times
 
 
@@ -77,8 +77,7 @@ def studies(out: Path, runs: int, chosen: list[str] | None) -> Iterator[tuple[st
     """Rows of the first runs of every study, or of the chosen ones, without measured times."""
     for study in chosen or STUDIES:
         folder = out / study
-        words = [] if study in WITHOUT_RUNS else ["--runs", runs]
-        words += ["--data", DATA] if study in WITH_DATA else []
+        words = OPTIONS.get(study, []) + ([] if study in WITHOUT_RUNS else ["--runs", runs])
         echostep("evaluate", study, *words, "--out", folder, "--json", folder / "rows.json")
         rows = json.loads((folder / "rows.json").read_text())["rows"]
         recorded = [

@@ -146,38 +146,17 @@ STUDIES = (
         lambda request, given: _of("incapacity.study").incapacity_study(given["days"], given["data"], request.seed),
     ),
     StudyCommand(
-        "lee2010",
-        PAPERS,
-        "The lap, the floors and the 3D track of Lee and Lee 2010, by their method and by ours (simulated).",
-        "minutes",
-        _usual("lee2010", 100, "People to simulate."),
-        lambda _request, _given: _of("lee2010.study").STUDY,
-    ),
-    StudyCommand(
-        "trails",
-        PAPERS,
-        "The trails of Fischer et al. 2008, by their dead reckoning and by ours (simulated).",
-        "minutes",
-        _usual("trails", 10, "Walks of each trail, each by another person."),
-        lambda _request, _given: _of("trails.study").STUDY,
-    ),
-    StudyCommand(
         "legs",
-        OURS,
-        "Walks of 5 m by many simulated people, and what each fault of the sensors does; with --data, real legs against the feet.",
-        "seconds",
-        _usual("legs", 100, "People to simulate.", _data("Real legs instead: folder of the public recordings.")),
-        lambda _request, given: (
-            _of("legs.recordings").recordings_study(given["data"]) if given["data"] else _of("legs.people").STUDY
+        PAPERS,
+        "Legs and feet in every manner of moving, and the walks of Lee and Lee 2010 (simulated); with --data, real legs against the feet.",
+        "an hour",
+        _usual(
+            "legs", 100, "People to simulate.", _data("Real legs instead: folder of the public recordings."),
+            _rows("lap/*", " The paper's: 'lap/*', 'storeys*', 'floors'."),
         ),
-    ),
-    StudyCommand(
-        "gaits",
-        OURS,
-        "Walking, hurrying, crawling, sidestepping, stairs and ladders, by the foot alone and by one leg alone (simulated).",
-        "minutes",
-        _usual("gaits", 20, "Courses in each manner."),
-        lambda _request, _given: _of("gaits.study").STUDY,
+        lambda _request, given: (
+            _of("legs.recordings").recordings_study(given["data"]) if given["data"] else _of("legs.study").legs_study(given["rows"])
+        ),
     ),
     StudyCommand(
         "floors",
@@ -277,9 +256,9 @@ STUDIES = (
     StudyCommand(
         "noplan",
         OURS,
-        "Buildings drawn from a walk without a plan, beside FootSLAM; a second person on the drawing (simulated).",
+        "Buildings drawn from a walk without a plan, beside FootSLAM; the trails of Fischer et al. 2008 (simulated).",
         "hours",
-        _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min")),
+        _usual("noplan", 50, "Walks of each row.", WESTPORT, _rows("*/10min", " The paper's: 'trail/*'.")),
         lambda request, given: _of("noplan.study").noplan_study(given["data"], given["rows"], request),
     ),
 )  # fmt: skip

@@ -11,7 +11,6 @@ from echostep_studies.incapacity import study as incapacity
 from echostep_studies.incapacity.columns import TOLD_S, LyingRun, summarize
 from echostep_studies.incapacity.fall_recordings import recorded as recorded_falls
 from echostep_studies.incapacity.falls import KITS, FallRun, NoFallRun, fallen, not_fallen, tables
-from echostep_studies.incapacity.falls import summarize as summarize_falls
 from echostep_studies.incapacity.study import incapacitated, one_run, recorded, work_day
 from echostep_studies.simulation.falling import FALLS, NO_FALLS
 from needs_data import data_or_skip
@@ -51,7 +50,7 @@ def stated(value: float | UnsetType) -> float:
 
 
 def test_falls_are_counted_by_kit_and_manner_and_the_belt_tells_them_all() -> None:
-    rows = summarize_falls([fallen(seed) for seed in range(3 * len(FALLS))])
+    rows = summarize([fallen(seed) for seed in range(3 * len(FALLS))])
     assert [row["name"] for row in rows[:4]] == [f"belt: {manner}" for manner in FALLS]
     assert len(rows) == len(KITS) * len(FALLS)
     assert all(row["told"] == row["runs"] and stated(row["longest_s"]) < 7.0 for row in rows[:4])
@@ -61,12 +60,12 @@ def test_falls_are_counted_by_kit_and_manner_and_the_belt_tells_them_all() -> No
 
 
 def test_what_is_no_fall_is_counted_apart() -> None:
-    rows = summarize_falls([not_fallen(seed) for seed in range(0, 3 * len(NO_FALLS), 3)])
+    rows = summarize([not_fallen(seed) for seed in range(0, 3 * len(NO_FALLS), 3)])
     assert all(row["claimed"] == 0 for row in rows)
     assert [row["name"] for row in rows] == [f"belt: {manner}" for manner in NO_FALLS]
 
 
 def test_no_recording_of_feet_or_trunks_has_a_fall() -> None:
-    rows = summarize_falls(recorded_falls(data_or_skip("vicon_pyshoe").parent))
+    rows = summarize(recorded_falls(data_or_skip("vicon_pyshoe").parent))
     assert [row["name"] for row in rows] == ["recorded: feet", "recorded: trunks"]
     assert all(row["claimed"] == 0 and stated(row["watched_h"]) > 0.05 for row in rows)

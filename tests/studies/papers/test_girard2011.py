@@ -158,7 +158,7 @@ def test_the_imu_row_is_calibrated_to_the_papers() -> None:
     """Means over walks: mean, deviation and maximum within 15 % of 0.59, 0.35 and 1.47 m; the end, the paper's maximum as well, within 20 %."""
     site = sites.otb()
     walks = [walk_markers(lay_markers(site.route), site.built, seed) for seed in range(100)]
-    errors = [study._row("imu", "", 0, w, list(study.dead_reckoned(site, w, 0))).errors_m for w in walks]
+    errors = [study.method_run("imu", "", 0, w, study.dead_reckoned(site, w, 0)).errors_m for w in walks]
     row = summary("imu", "girard2011", errors, [])
     assert row["mean_m"] == pytest.approx(0.59, rel=0.15)
     assert row["sd_m"] == pytest.approx(0.35, rel=0.15)
@@ -244,3 +244,9 @@ def test_a_foot_board_is_as_good_as_an_mtx_on_the_same_steps() -> None:
     for pace in kit_feet.PACES:
         assert means[f"foot alone, {pace}, foot board, calibrated"] < 2.0 * means[f"foot alone, {pace}, MTx 18 g"] + 0.1
     assert max(means.values()) < 3.0
+
+
+def test_the_table_of_kits_has_the_rows_of_a_filter_together() -> None:
+    names = ["default, SRF02", "paper's filter, SRF02", "default, pulse"]
+    (table,) = kits.STUDY.tables([{"name": name} for name in names], StudyRequest(1, 1, None, Path()))
+    assert [row["name"] for row in table.rows] == [names[0], names[2], names[1]]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.walls.echo_sources import Walls
-from echostep_studies.papers.girard2011_rays import POSES, lambda_ray_ranges
+from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 from naive import walls as naive
 from walls.test_walls import plans
 
@@ -37,11 +37,11 @@ def test_cone_readings_agree_with_plain_rays(
 
 @pytest.mark.slow
 def test_many_poses_read_what_each_would_alone() -> None:
-    """More in a tile than are taken at a time, in no order, some nowhere; a few go another way."""
+    """Many in a tile, in no order, some nowhere."""
     rng = np.random.default_rng(5)
     walls = rng.uniform(0.0, 6.0, (20, 4))
     owner = Walls(walls, 0.5 * math.radians(55.0) / 7)
-    x, y, heading = rng.uniform(2.0, 4.0, 3 * POSES), rng.uniform(2.0, 3.0, 3 * POSES), rng.uniform(-4, 4, 3 * POSES)
+    x, y, heading = rng.uniform(2.0, 4.0, 768), rng.uniform(2.0, 3.0, 768), rng.uniform(-4, 4, 768)
     x[::50], heading[7::50] = np.nan, np.inf
     index = owner.near(x, y)
     found = lambda_ray_ranges(x, y, heading, index)
@@ -49,4 +49,4 @@ def test_many_poses_read_what_each_would_alone() -> None:
     assert found == pytest.approx(np.array(alone), abs=1e-9)
     assert (found[::50] == 6.0).all()
     assert (found[7::50] == 6.0).all()
-    assert len(np.unique(found)) > POSES
+    assert len(np.unique(found)) > 256

@@ -38,10 +38,6 @@ def _no_segments() -> Floats:
     return np.zeros((0, 4))
 
 
-def _no_places() -> Floats:
-    return np.zeros((0, 3))
-
-
 @dataclass(frozen=True, slots=True)
 class Room:
     """A room's name and its position; its outline (n, 2) in metres, or None."""
@@ -97,7 +93,7 @@ class Level:
     obstacles: tuple[Floats, ...] = ()
     doubtful: Floats = field(default_factory=_no_segments)
     questions: tuple[Question, ...] = ()
-    place_sd: Floats = field(default_factory=_no_places)
+    place_sd: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __repr__(self) -> str:
         """Name, height and size."""

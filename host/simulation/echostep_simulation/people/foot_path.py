@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats
 from echostep_simulation.people.attitude import rotations
+from echostep_simulation.people.rolling_foot import glide
 
 HEEL_OFF, TOE_OFF, HEEL_STRIKE, FLAT = 0.20, 0.35, 0.73, 0.80  # shares of the stride, from the middle of the stance
 BALL = np.array([0.10, 0.0, -0.08])  # from the sensor, foot frame (m)
@@ -78,7 +79,7 @@ def foot_path(t_s: Floats, strides: Strides, foot: FootPath, height_m: Floats) -
     yaw = strides.heading_rad - foot.toe_out_rad
     left = np.column_stack([-np.sin(strides.heading_rad), np.cos(strides.heading_rad)])
     prints = strides.trunk_m + foot.left_m * left
-    gone = _ease(share, 0.5 * (HEEL_OFF + TOE_OFF), 0.5 * (HEEL_STRIKE + FLAT))
+    gone = glide(share, 0.5 * (HEEL_OFF + TOE_OFF), 0.5 * (HEEL_STRIKE + FLAT))
     rpy = np.zeros((len(t_s), 3))
     rpy[:, 0] = foot.roll_rad * effort * _bump(share, TOE_OFF, HEEL_STRIKE)
     rpy[:, 1] = effort * (foot.toe_down_rad * _bump(share, HEEL_OFF, 0.55) - foot.toe_up_rad * _bump(share, 0.55, FLAT))
@@ -88,14 +89,14 @@ def foot_path(t_s: Floats, strides: Strides, foot: FootPath, height_m: Floats) -
     place[:, 2] = -BALL[2] + effort * foot.lift_m * _bump(share, TOE_OFF - 0.05, HEEL_STRIKE + 0.02)
     place[:, 2] += effort * _knock(share, np.diff(strides.t_s)[k])
     rise = np.diff(strides.ground_m)[k]
-    lifted = np.where(rise > 0.0, _ease(share, HEEL_OFF + 0.05, 0.60), _ease(share, 0.45, 0.5 * (HEEL_STRIKE + FLAT)))
+    lifted = np.where(rise > 0.0, glide(share, HEEL_OFF + 0.05, 0.60), glide(share, 0.45, 0.5 * (HEEL_STRIKE + FLAT)))
     place[:, 2] += np.where(strides.moves[k], strides.ground_m[k] + lifted * rise, height_m)
     return place + _roll_over(share, rpy), rpy, (share <= HEEL_OFF) | (share >= FLAT)
 
 
 def _roll_over(share: Floats, rpy: Floats) -> Floats:
     """How the sensor moves (n, 3) because the foot turns about the ball of the toes, then, from mid swing on, about the heel."""
-    late = _ease(share, TOE_OFF, HEEL_STRIKE)[:, None]
+    late = glide(share, TOE_OFF, HEEL_STRIKE)[:, None]
     lever = -(BALL + late * (HEEL - BALL))
     upright = np.column_stack([np.zeros((len(rpy), 2)), rpy[:, 2]])
     shift_m: Floats = np.einsum("nij,nj->ni", rotations(rpy) - rotations(upright), lever)
@@ -107,13 +108,6 @@ def _knock(share: Floats, span_s: Floats) -> Floats:
     since_s = np.clip(share - HEEL_STRIKE, 0.0, None) * span_s
     shift_m: Floats = KNOCK_M * _bump(share, HEEL_STRIKE, FLAT) * np.sin(2.0 * np.pi * KNOCK_HZ * since_s)
     return shift_m
-
-
-def _ease(share: Floats, start: float, end: float) -> Floats:
-    """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
-    v = np.clip((share - start) / (end - start), 0.0, 1.0)
-    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return eased
 
 
 def _bump(share: Floats, start: float, end: float) -> Floats:

@@ -67,7 +67,7 @@ class Course:
     prints_m: Floats
 
 
-def glide(t: Floats, begin: float, end: float) -> Floats:
+def glide(t: Floats, begin: float = 0.0, end: float = 1.0) -> Floats:
     """Minimum-jerk rise from 0 to 1 [Flash and Hogan 1985]."""
     u = np.clip((t - begin) / (end - begin), 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)

@@ -33,7 +33,11 @@ def displaced(plan: Plan, sd_m: float, rng: np.random.Generator) -> Plan:
 def wall_missing(plan: Plan, way: Floats, rng: np.random.Generator) -> Plan:
     """Without one of the long walls beside the way (n, 2)."""
     walls = plan.levels[0].walls
-    candidates = [k for k, wall in enumerate(walls) if _length(wall) > LONG_M and _distance(wall, way) < NEAR_M]
+    candidates = [
+        k
+        for k, wall in enumerate(walls)
+        if math.hypot(*(wall[2:] - wall[:2])) > LONG_M and _distance(wall, way) < NEAR_M
+    ]
     if not candidates:
         raise EchostepError(f"plan {plan.name}: no wall of {LONG_M} m stands beside the way")
     return _with_walls(plan, np.delete(walls, rng.choice(candidates), axis=0))
@@ -59,10 +63,6 @@ def mirrored(plan: Plan, pose: Pose) -> tuple[Plan, Pose]:
 def _with_walls(plan: Plan, walls: Floats) -> Plan:
     """A plan of these walls alone; rooms would not fit any more."""
     return replace(plan, levels=(replace(plan.levels[0], walls=walls, rooms=()),), start=None)
-
-
-def _length(wall: Floats) -> float:
-    return math.hypot(wall[2] - wall[0], wall[3] - wall[1])
 
 
 def _distance(wall: Floats, way: Floats) -> float:

@@ -6,22 +6,20 @@ In: seeds; the public recordings for westport-house. Out: the table, JSON, Parqu
 
 from __future__ import annotations
 
-from fnmatch import fnmatch
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from echostep.errors import EchostepError
 from echostep_app.output.table import Table
 from echostep_studies.anywhere.amcl import track_by_amcl
 from echostep_studies.anywhere.trials import NEEDS_DATA, PEERED, TRIALS, Trial, Walks
 from echostep_studies.bench.columns import ClaimsRow, JudgedRow, run_row, summaries, tables
 from echostep_studies.bench.filtering import FilterRun, track
-from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, TruePlaces, judge, true_levels
-from echostep_studies.bench.sites import WESTPORT
+from echostep_studies.bench.judgement import SEARCH_M, JudgedRun, judge, true_places
+from echostep_studies.bench.sites import westport_in
 from echostep_studies.bench.stanford import draw_stanford
-from echostep_studies.bench.walks import T, X, Y, Z
+from echostep_studies.frame.parts import matching
 from echostep_studies.frame.report import Row
 from echostep_studies.frame.study import Study, StudyRequest
 
@@ -43,10 +41,8 @@ def _judged(trial: Trial, run: FilterRun) -> JudgedRun:
     """The claims from the beginning of the search on."""
     walk, claims = trial.walk, [c for c in run.claims if c.t_s >= trial.from_s]
     t_s = np.array([c.t_s for c in claims])
-    x, y, z = (np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y, Z))
-    place = np.column_stack([x, y])
     walked_m = walk.walked_m(t_s) - walk.walked_m(np.array([trial.from_s]))
-    return judge(claims, TruePlaces(place, true_levels(place, z, trial.plan)), walked_m)
+    return judge(claims, true_places(walk.truth, t_s, trial.plan), walked_m)
 
 
 def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, Row]:
@@ -54,12 +50,9 @@ def anywhere_study(data: Path | None, rows: str = "*") -> Study[ClaimsRow, Row]:
 
     The peer's rows are run where the pattern names it: they cost three times what all others do.
     """
-    if data is not None and not (data / WESTPORT).is_file():
-        raise EchostepError(f"{data / WESTPORT}: not there: without --data its row is left out")
+    westport_in(data)
     every = [name for trial in TRIALS if data or trial not in NEEDS_DATA for name in _methods(trial)]
-    names = tuple(name for name in every if fnmatch(name, rows) and name.endswith(PEER) == rows.endswith(PEER))
-    if not names:
-        raise EchostepError(f"--rows {rows}: no row is named so; there are: {', '.join(every)}")
+    names = matching((name for name in every if name.endswith(PEER) == rows.endswith(PEER)), rows)
     return Study(
         "anywhere", (ClaimsRow, JudgedRow), partial(one_run, names, data), summaries, _tables, draw_runs=draw_stanford
     )

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from echostep_app.output.table import Table
 from echostep_studies.bench.filtering import FilterRun
 from echostep_studies.bench.judgement import JudgedRun
-from echostep_studies.frame.report import LOST_END_M, Row, as_dict, rows_by_name
+from echostep_studies.frame.report import LOST_END_M, Row, as_dict, by_name, named
 
 ALARM_S = 5.0  # an error of more than ALARM_M must be flagged within this time
 FIT = 0.5  # probability of the plan below which a run says that it does not fit
@@ -29,6 +30,7 @@ CLAIM_COLUMNS = {
     "beyond_protection": "beyond radius %", "in_ellipse": "in ellipse %", "alarm_s": "alarm s", "alarm_in_5s": "in 5 s %",
     "false_alarms_h": "false alarms /h",
 }  # fmt: skip
+_rounded = partial(round, ndigits=5)
 SHARES = (
     "found", "listed", "false_tracking", "false_lost", "beyond_protection", "in_ellipse", "alarm_in_5s", "named", "tracking",
 )  # fmt: skip
@@ -106,15 +108,10 @@ def run_row(name: str, seed: int, judged: JudgedRun | None, run: FilterRun) -> C
     )  # fmt: skip
 
 
-def summaries(rows: Sequence[ClaimsRow]) -> list[Row]:
-    """One summary row for each name."""
-    return [_summary(group) for group in rows_by_name(rows)]
-
-
 def _summary(runs: Sequence[ClaimsRow]) -> Row:
     claims = sum(r.claims for r in runs)
     summary = {
-        "name": runs[0].name, "runs": len(runs), "named": _rounded(float(np.mean([r.named for r in runs]))),
+        **named(runs), "named": _rounded(float(np.mean([r.named for r in runs]))),
         "tracking": _rounded(sum(r.tracking * r.claims for r in runs) / claims),
         "most_particles": max(r.most_particles for r in runs),
         "times_real_time": _rounded(sum(r.span_s for r in runs) / max(sum(r.cpu_s for r in runs), 1e-9)),
@@ -148,5 +145,4 @@ def _judged_summary(summary: Row, runs: Sequence[JudgedRow]) -> Row:
     }  # fmt: skip
 
 
-def _rounded(value: float) -> float:
-    return round(value, 5)
+summaries = by_name(_summary)

@@ -43,12 +43,12 @@ def with_people(walk: SimulatedWalk, share: float, rng: np.random.Generator) -> 
         nearest = np.fmin(segment.range_m, person_m)
         return np.where(np.isfinite(nearest), nearest, np.nan)
 
-    return _changed(walk, ranges)
+    return changed(walk, ranges)
 
 
 def silenced(walk: SimulatedWalk, share: float, rng: np.random.Generator) -> SimulatedWalk:
     """`share` of the pings hear nothing."""
-    return _changed(walk, lambda s: np.where(rng.random(len(s.t_s)) < share, np.nan, s.range_m))
+    return changed(walk, lambda s: np.where(rng.random(len(s.t_s)) < share, np.nan, s.range_m))
 
 
 def one_ranger(walk: SimulatedWalk, ranger: int = LEFT) -> SimulatedWalk:
@@ -98,5 +98,6 @@ def _passing_times(end_s: float, share: float, rng: np.random.Generator) -> Floa
     return np.array(rows)
 
 
-def _changed(walk: SimulatedWalk, ranges: Change) -> SimulatedWalk:
+def changed(walk: SimulatedWalk, ranges: Change) -> SimulatedWalk:
+    """The walk with the ranges that a change gives of each segment, in their order."""
     return replace(walk, segments=tuple(replace(s, range_m=ranges(s)) for s in walk.segments))

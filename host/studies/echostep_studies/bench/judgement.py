@@ -20,6 +20,8 @@ from echostep.localization import TrackStatus
 from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import Plan
 from echostep_studies.bench.filtering import Claim
+from echostep_studies.bench.walks import T, X, Y, Z
+from echostep_studies.frame.truth import at_times
 
 FOUND_M = 1.0  # a wearer is found within this error
 SEARCH_M = 40.0  # of the way, after which a wearer must be found
@@ -123,6 +125,12 @@ class JudgedRun:
     def span_s(self) -> float:
         """Time from the first claim to the last."""
         return float(self.t_s[-1] - self.t_s[0]) if len(self.t_s) else 0.0
+
+
+def true_places(truth: Floats, t_s: Floats, plan: Plan) -> TruePlaces:
+    """What is true at the times t_s (n,) by the truth (m, 5) of a `SimulatedWalk`."""
+    at = at_times(t_s, truth[:, T], truth[:, [X, Y, Z]])
+    return TruePlaces(at[:, :2], true_levels(at[:, :2], at[:, 2], plan))
 
 
 def true_levels(xy_m: Floats, z_m: Floats, plan: Plan) -> Bools:

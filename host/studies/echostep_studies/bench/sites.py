@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.errors import EchostepError
 from echostep.plan import Level, Plan, Pose, load_plan
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.people.walker import Waypoint
@@ -39,6 +40,14 @@ class Site:
 
     built: Plan
     waypoints: tuple[Waypoint, ...]
+
+
+def westport_in(data: Path | None) -> Path | None:
+    """The plan of westport-house in a folder of public recordings; None without a folder; raises EchostepError where it is not in there."""
+    path = None if data is None else data / WESTPORT
+    if path is not None and not path.is_file():
+        raise EchostepError(f"{path}: not there: without --data its rows are left out")
+    return path
 
 
 def office(seed: int, length_m: float = TOUR_M) -> Site:

@@ -13,20 +13,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
-from echostep.ports.chunks import MTX, Chunk, portion_of
+from echostep.ports.chunks import MTX, Chunk
 from echostep.settings import Settings
 from echostep.tracker import Tracker
+from echostep_app.session.chunk_streams import portions_of
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.devices.board_sensors import WornGyro
 from echostep_simulation.devices.mtx import MtxModel
 from echostep_simulation.people.walker import Person
 from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.sites import Site
+from echostep_studies.frame.truth import at_times
 
 CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs
-PORTION = 1000  # chunks that the front end gets at once
+PORTION = 1000  # chunks that a tracker or a front end gets at once
 T, X, Y, HEADING, Z = range(5)  # columns of the truth
 
 
@@ -44,6 +47,14 @@ class SimulatedWalk:
         heading = float(np.interp(t_s, self.truth[:, T], np.unwrap(self.truth[:, HEADING])))
         heights = [abs(level.height_m - z) for level in self.built.levels]
         return Pose(x, y, heading, heights.index(min(heights)))
+
+    def places_at(self, t_s: Floats) -> Floats:
+        """True places (n, 2) at times (n,)."""
+        return at_times(t_s, self.truth[:, T], self.truth[:, [X, Y]])
+
+    def heights_at(self, t_s: Floats) -> Floats:
+        """True heights of the floor (n,) at times (n,)."""
+        return np.interp(t_s, self.truth[:, T], self.truth[:, Z])
 
     def walked_m(self, t_s: Floats) -> Floats:
         """Length of the true way up to times (n,), seen from above."""
@@ -91,6 +102,10 @@ def _chunks(
 def walk_of(built: Plan, chunks: Sequence[Chunk], truth: Floats, settings: Settings | None = None) -> SimulatedWalk:
     """The walk that these bytes are."""
     front_end = Tracker(built, None, settings, waits=True).front_end
-    portions = (portion_of(chunks[k : k + PORTION]) for k in range(0, len(chunks), PORTION))
-    pieces = [piece for portion in portions for piece in front_end.process(portion)]
+    pieces = [piece for portion in portions_of(chunks, PORTION) for piece in front_end.process(portion)]
     return SimulatedWalk(built, tuple(p for p in pieces if isinstance(p, MeasuredSegment)), truth)
+
+
+def tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[Estimate]:
+    """The estimates of a tracker that takes these bytes."""
+    return [estimate for portion in portions_of(chunks, PORTION) for estimate in tracker.take(portion)]

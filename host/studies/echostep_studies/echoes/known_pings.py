@@ -47,16 +47,16 @@ def _sources(x: Floats, y: Floats, axis: Floats, index: WallIndex) -> tuple[Ints
 
 
 @kernel
-def log_densities(pings: KnownPings, m: EchoModel) -> Floats:
+def log_densities(pings: KnownPings, m: EchoModel, limited: bool = True) -> Floats:
     """Log-density (n,) of the pings.
 
-    A range beyond the ranger's limits is an echo of a source, or an outlier uniform over the reach of any ranger: otherwise narrow limits would
-    cost nothing.
+    `limited`: a range beyond the ranger's limits is an echo of a source, or an outlier uniform over the reach of any ranger: otherwise narrow
+    limits would cost nothing.
     """
     found = np.empty(len(pings.range_m))
     for i in range(len(found)):
         range_m = pings.range_m[i]
-        if range_m > m.maximum_m or 0.0 < range_m < m.minimum_m:
+        if limited and (range_m > m.maximum_m or 0.0 < range_m < m.minimum_m):
             density = planned_density(
                 range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m.stray, 0.0, m
             )

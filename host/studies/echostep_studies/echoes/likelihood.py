@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_density, echo_model
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_model
+from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import console
+from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.simulation.marker_walk import lay_markers, walk_markers
 from echostep_studies.simulation.sites import angled, otb, thousand
 
@@ -23,13 +24,8 @@ FITTED = ("sd_m", "slant_m", "rim_db", "soft_db", "edge_db", "corner_db", "stray
 
 def log_p(plan: Walls, pose: tuple[float, float, float], ranges_m: Floats, model: EchoModel) -> Floats:
     """Log-likelihood of ranges (n,) of the left ranger at a pose."""
-    x, y, heading = pose
-    away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
-    axis = heading + 0.5 * math.pi
-    index = plan.near(np.array([x]), np.array([y]))
-    count = echo_sources(x, y, axis, index, away, off, kind)
-    heard_m = np.nan_to_num(ranges_m, nan=0.0).tolist()
-    return np.log([echo_density(z, count, away, off, kind, model) for z in heard_m])
+    x, y, heading = (np.full(len(ranges_m), value) for value in pose)
+    return log_densities(known_pings(plan, x, y, heading + 0.5 * math.pi, ranges_m), model, False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,23 +49,22 @@ def fitted(seed: int) -> list[SettingRow]:
         if chosen["stray"] >= 0.95:
             return math.inf
         model = echo_model(replace(EchoSettings(), **chosen))
-        return -float(np.log([echo_density(z, n, d, off, kind, model) for z, n, d, off, kind in seen]).mean())
+        return -float(np.concatenate([log_densities(pings, model, False) for pings in seen]).mean())
 
     best = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 400, "xatol": 0.02, "fatol": 1e-4})
-    console.print(f"fit on {len(seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-best.fun:.3f} fitted")
+    console.print(
+        f"fit on {sum(len(pings.range_m) for pings in seen)} simulated pings: mean log p {-cost(start):.3f} as set, {-best.fun:.3f} fitted"
+    )
     return [
         SettingRow(name=f"fit: {name}", set=getattr(EchoSettings(), name), fitted=round(value, 4))
         for name, value in zip(FITTED, np.exp(best.x).tolist(), strict=True)
     ]
 
 
-def _at_true_poses(seed: int) -> list[tuple[float, int, Floats, Floats, Floats]]:
+def _at_true_poses(seed: int) -> list[KnownPings]:
     seen = []
     for site in (otb(), angled(), thousand()):
-        walk = walk_markers(lay_markers(site.route), site.built, 10_000 + seed)
-        plan, p = Walls(site.plan), walk.pings
-        for x, y, axis, z in zip(*p.pose.T.tolist(), p.range_m.tolist(), strict=True):
-            away, off, kind = (np.empty(MOST_SOURCES) for _ in range(3))
-            count = echo_sources(x, y, axis, plan.near(np.array([x]), np.array([y])), away, off, kind)
-            seen.append((0.0 if math.isnan(z) else z, count, away, off, kind))
+        pings = walk_markers(lay_markers(site.route), site.built, 10_000 + seed).pings
+        x, y, axis = pings.pose.T
+        seen.append(known_pings(Walls(site.plan), x, y, axis, pings.range_m))
     return seen

@@ -105,7 +105,6 @@ def echoes_study(*, fit: bool, sweeps: Path | None = None) -> Study[EchoesRow, E
         partial(one_run, fit=fit) if measured is None else partial(measured_run, measured),
         lambda rows: rows,
         partial(_tables, is_real=measured is not None),
-        journal=False,
         parquet=None,
     )
 
@@ -136,10 +135,10 @@ def _tables(rows: list[EchoesRow], _request: StudyRequest, *, is_real: bool) -> 
         (SweepRow, f"{origin} sweeps: the density, and places found within 10 cm from one sweep", SWEEP_COLUMNS),
         (SettingRow, "Echo settings", SETTINGS_COLUMNS),
     )
-    chosen = [
-        (title, as_dicts(row for row in rows if isinstance(row, kind)), columns) for kind, title, columns in kinds
+    tables = [
+        Table(title, as_dicts(row for row in rows if isinstance(row, kind)), columns) for kind, title, columns in kinds
     ]
-    return [Table(title, found, columns) for title, found, columns in chosen if found]
+    return [table for table in tables if table.rows]
 
 
 def _row(effect: Effect) -> EchoRow:

@@ -88,7 +88,6 @@ def feet_study(folder: Path, out: Path | None, *, left_out: bool) -> Study[Figur
         None if out is None else lambda folder, _seed, _rows: draw_tracks(folder / "feet.png", recordings, tracks),
         runs=len(recordings),
         seeds=range(1),
-        journal=False,
         parquet=None,
     )
 

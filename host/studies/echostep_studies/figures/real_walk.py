@@ -30,7 +30,7 @@ from echostep.walk.table import write_track
 from echostep_app.output.track_plot import draw_track
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.session.metadata import start_recording
-from echostep_studies.bench.recordings.foot_metrics import align, rmse
+from echostep_studies.bench.recordings.foot_metrics import rmse
 from echostep_studies.bench.recordings.hallways import (
     LONG_STEP_M,
     SETTINGS,
@@ -41,6 +41,7 @@ from echostep_studies.bench.recordings.hallways import (
     read_hallway,
 )
 from echostep_studies.frame.recordings import DATA
+from echostep_studies.frame.truth import at_times
 
 NAME = "GX5 33"
 NOTE = "foot real (GX5 33, surveyed footprints); plan drawn around the surveyed path, echoes simulated from it at the true positions"
@@ -89,8 +90,7 @@ def track(out: Path, seed: int) -> tuple[list[Estimate], float]:
 
 def rmse_at_prints(walk: Hallway, t_s: Floats, xy_m: Floats) -> float:
     """2D RMSE (m) at the footprints' times of positions xy_m (n, 2) given at t_s (n,); map frame, no alignment."""
-    at_prints = np.column_stack([np.interp(walk.print_t_s, t_s, xy_m[:, k]) for k in (0, 1)])
-    return float(np.sqrt(((at_prints - walk.print_m) ** 2).sum(1).mean()))
+    return float(np.sqrt(((at_times(walk.print_t_s, t_s, xy_m) - walk.print_m) ** 2).sum(1).mean()))
 
 
 def foot_alone(walk: Hallway, start: Pose) -> tuple[float, float]:
@@ -100,8 +100,7 @@ def foot_alone(walk: Hallway, start: Pose) -> tuple[float, float]:
     turn = start.heading_rad - math.atan2(steps[0].move_m[1], steps[0].move_m[0])
     c, s = math.cos(turn), math.sin(turn)
     xy = foot.position_m[:, :2] @ np.array([[c, s], [-s, c]]) + [start.x_m, start.y_m]
-    at_prints = np.column_stack([np.interp(walk.print_t_s, walk.t_s, xy[:, k]) for k in (0, 1)])
-    return rmse_at_prints(walk, walk.t_s, xy), rmse(align(at_prints, walk.print_m), walk.print_m)
+    return rmse_at_prints(walk, walk.t_s, xy), rmse(at_times(walk.print_t_s, walk.t_s, xy), walk.print_m)
 
 
 def main() -> int:

@@ -9,7 +9,7 @@ every row is on the same ground: trail, beacons and sources of seed + k.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from echostep_simulation.world.beacon_ground import GroundSettings, ground
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, Knowledge, guided_return
 from echostep_studies.fischer2008.walker import EXACT, Obedience
 from echostep_studies.frame.pictures import BLUE, ORANGE, axes_of, save
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import Row, by_name
 from echostep_studies.frame.study import Study, StudyRequest
 
 LABELS = {
@@ -33,36 +33,6 @@ LABELS = {
     "outliers": "share of ranges with 3 m added",
     "period_s": "time between measurements (s)",
 }
-
-
-def draw_sweeps(
-    path: Path,
-    sweeps: Mapping[str, Sequence[float]],
-    nominal: Mapping[str, float],
-    rows: Mapping[str, Mapping[str, Any]],
-) -> None:
-    """Success with its 95 % interval over each parameter, for the paper's fusion and the particle filter."""
-    columns = 3
-    figure, axes = axes_of(-(-len(sweeps) // columns), columns, (4.2 * columns, 3.2 * -(-len(sweeps) // columns)))
-    flat = [ax for line in axes for ax in line]
-    for ax, (parameter, values) in zip(flat, sweeps.items(), strict=False):
-        for name, colour in (("fischer2008", ORANGE), ("default", BLUE)):
-            names = {nominal[parameter]: name} | {v: f"sweep/{parameter}={v:g}/{name}" for v in values}
-            points = [(v, rows[row]) for v, row in sorted(names.items()) if row in rows]
-            x = [v for v, _ in points]
-            y = np.array([100.0 * row["success"] for _, row in points])
-            low = np.maximum(y - [100.0 * row["low95"] for _, row in points], 0.0)
-            high = np.maximum([100.0 * row["high95"] for _, row in points] - y, 0.0)
-            ax.errorbar(x, y, [low, high], color=colour, marker="o", ms=4, capsize=3, lw=1.2, label=name)
-        ax.set_xlabel(LABELS[parameter], fontsize=8)
-        ax.set_ylim(-3.0, 103.0)
-        ax.tick_params(labelsize=7)
-    flat[0].set_ylabel("exit reached (%)", fontsize=8)
-    flat[0].legend(fontsize=8)
-    figure.suptitle("Simulated: guided returns as beacons get worse, 95 % intervals")
-    save(figure, path)
-
-
 BATCH = 50  # returns a task
 INEXACT = Obedience(delay_s=0.6, heading_sd_deg=15.0, wrong_turns=0.03)  # assumed
 SYSTEMS = {"pdr": PDR, "fischer2008": PAPER, "default": OURS}
@@ -140,7 +110,7 @@ def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, Row]:
         "fischer2008",
         (BatchRun,),
         partial(one_batch, first=seed, runs=runs),
-        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        by_name(_summary),
         _tables,
         draw,
         seeds=range(math.ceil(runs / BATCH)),
@@ -193,9 +163,23 @@ def wilson95(successes: int, runs: int) -> tuple[float, float]:
 
 
 def draw(out: Path, _seed: int, rows: list[Row]) -> None:
-    """Success over each parameter that was varied."""
-    from echostep_studies.fischer2008.study import draw_sweeps
-
-    by_name = {r["name"]: r for r in rows}
-    nominal = {key: getattr(NOMINAL, key, 0.2) for key in SWEEPS}
-    draw_sweeps(out / "sweeps.png", SWEEPS, nominal, by_name)
+    """Success with its 95 % interval over each parameter that was varied, for the paper's fusion and the particle filter."""
+    columns, by_label = 3, {row["name"]: row for row in rows}
+    figure, axes = axes_of(-(-len(SWEEPS) // columns), columns, (4.2 * columns, 3.2 * -(-len(SWEEPS) // columns)))
+    flat = [ax for line in axes for ax in line]
+    for ax, (parameter, values) in zip(flat, SWEEPS.items(), strict=False):
+        for name, colour in (("fischer2008", ORANGE), ("default", BLUE)):
+            names = {getattr(NOMINAL, parameter, 0.2): name} | {v: f"sweep/{parameter}={v:g}/{name}" for v in values}
+            points = [(v, by_label[label]) for v, label in sorted(names.items()) if label in by_label]
+            x = [v for v, _ in points]
+            y = np.array([100.0 * row["success"] for _, row in points])
+            low = np.maximum(y - [100.0 * row["low95"] for _, row in points], 0.0)
+            high = np.maximum([100.0 * row["high95"] for _, row in points] - y, 0.0)
+            ax.errorbar(x, y, [low, high], color=colour, marker="o", ms=4, capsize=3, lw=1.2, label=name)
+        ax.set_xlabel(LABELS[parameter], fontsize=8)
+        ax.set_ylim(-3.0, 103.0)
+        ax.tick_params(labelsize=7)
+    flat[0].set_ylabel("exit reached (%)", fontsize=8)
+    flat[0].legend(fontsize=8)
+    figure.suptitle("Simulated: guided returns as beacons get worse, 95 % intervals")
+    save(figure, out / "sweeps.png")

@@ -16,12 +16,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from shapely import Point, Polygon
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import ANY_LEVEL, Connector, Plan, Pose, load_plan
-from echostep.ports.chunks import MTX, portion_of
+from echostep.plan import ANY_LEVEL, Plan, Pose, load_plan
+from echostep.ports.chunks import MTX
 from echostep.tracker import Tracker
 from echostep_app.guidance.tours import tour as tour_of
 from echostep_app.output.table import Table
@@ -31,14 +32,15 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
 from echostep_simulation.world.tower import tour, tower
-from echostep_studies.bench.sites import WESTPORT
-from echostep_studies.frame.report import LOST_END_M, Row, rows_by_name
+from echostep_studies.bench.sites import westport_in
+from echostep_studies.bench.walks import CORNER_M, T, X, Y, Z, tracked
+from echostep_studies.frame.report import LOST_END_M, Row, by_name, means, named
 from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.frame.truth import at_times
 
 STOREYS = 5
 REAL = "storeys/westport"  # name of the row of the real plan
 TIE_M = 0.5
-PORTION = 1000
 AWAY_M = (8.0, 30.0)  # of a place to visit from the stairs, as one walks
 COLUMNS = {
     "name": "", "runs": "runs", "mean_m": "mean m", "ce95_m": "CE95 m", "max_m": "max m", "ending_m": "end m", "floor_right": "right %",
@@ -108,20 +110,19 @@ def through(plan: Plan, seed: int) -> list[Waypoint]:
 
 
 def _row(name: str, scene: BuildingScene, plan: Plan, way: Sequence[Waypoint], seed: int) -> StoreysRun:
-    scenario = Scenario(plan, way, seed, PythonBoard(seed), Person(corner_m=0.3))
+    scenario = Scenario(plan, way, seed, PythonBoard(seed), Person(corner_m=CORNER_M))
     chunks = [c for c in scenario.chunks() if scene.foot or c.port != MTX]
     start = scenario.start
     tracker = Tracker(
         plan, Pose(start.x_m, start.y_m, start.heading_rad, start.level if scene.known else ANY_LEVEL), seed=seed
     )
-    estimates = [e for k in range(0, len(chunks), PORTION) for e in tracker.take(portion_of(chunks[k : k + PORTION]))]
-    return judge(plan, scenario.truth, estimates, name, seed)
+    return judge(plan, scenario.truth, tracked(tracker, chunks), name, seed)
 
 
 def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate], name: str, seed: int) -> StoreysRun:
     """Errors of a walk; `truth` (n, 5): t_s, x, y, heading, height."""
     t_s = np.array([e.t_s for e in estimates])
-    x, y, z = (np.interp(t_s, truth[:, 0], truth[:, k]) for k in (1, 2, 4))
+    x, y, z = at_times(t_s, truth[:, T], truth[:, [X, Y, Z]]).T
     error = np.hypot(x - [e.x_m for e in estimates], y - [e.y_m for e in estimates])
     places = list(zip(estimates, x.tolist(), y.tolist(), z.tolist(), strict=True))
     right = np.array([_right(plan, e, (px, py, pz), TIE_M) for e, px, py, pz in places])
@@ -144,25 +145,16 @@ def judge(plan: Plan, truth: Floats, estimates: Sequence[Estimate], name: str, s
 def _right(plan: Plan, e: Estimate, at_m: tuple[float, float, float], tie_m: float) -> bool:
     """Whether an estimate's floor is the nearest to a place, or as good."""
     x, y, z = at_m
-    served = {k for c in plan.connectors if c.kind == "lift" and _holds(c, x, y) for k in c.levels}
+    lifts = (c for c in plan.connectors if c.kind == "lift")
+    served = {k for c in lifts if Polygon(c.outline_m).buffer(0.3).contains(Point(x, y)) for k in c.levels}
     away = {k: abs(z - plan.levels[k].height_m) for k in served or range(len(plan.levels))}
     return e.level in away and away[e.level] <= min(away.values()) + 2.0 * tie_m
 
 
-def _holds(connector: Connector, x: float, y: float) -> bool:
-    from shapely import Point, Polygon
-
-    return bool(Polygon(connector.outline_m).buffer(0.3).contains(Point(x, y)))
-
-
 def _summary(rows: Sequence[StoreysRun]) -> Row:
-    def mean(key: str) -> float:
-        return round(sum(getattr(row, key) for row in rows) / len(rows), 4)
-
+    keys = ("mean_m", "sd_m", "ending_m", "ce95_m", "coverage95", "floor_right", "strict_right")
     return {
-        "name": rows[0].name, "profile": "default", "runs": len(rows), "mean_m": mean("mean_m"), "sd_m": mean("sd_m"),
-        "ending_m": mean("ending_m"), "ce95_m": mean("ce95_m"), "coverage95": mean("coverage95"),
-        "floor_right": mean("floor_right"), "strict_right": mean("strict_right"),
+        **named(rows), "profile": "default", **means(rows, keys, 4),
         "max_m": round(max(row.max_m for row in rows), 4), "min_m": round(min(row.min_m for row in rows), 4),
         "lost": sum(row.lost for row in rows), "longest_wrong_s": round(max(row.longest_wrong_s for row in rows), 4),
     }  # fmt: skip
@@ -177,13 +169,4 @@ def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
 
 def storeys_study(data: Path | None) -> Study[StoreysRun, Row]:
     """The study; `data`: folder of the public recordings, which holds the plan of westport-house."""
-    westport = None if data is None else data / WESTPORT
-    if westport is not None and not westport.is_file():
-        raise EchostepError(f"{westport}: not there: the tower alone can do without --data")
-    return Study(
-        "storeys",
-        (StoreysRun,),
-        partial(one_run, westport),
-        lambda rows: [_summary(group) for group in rows_by_name(rows)],
-        _tables,
-    )
+    return Study("storeys", (StoreysRun,), partial(one_run, westport_in(data)), by_name(_summary), _tables)

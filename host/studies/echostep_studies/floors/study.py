@@ -23,7 +23,7 @@ from echostep_app.offline.floors.pressure_csv import Pressures
 from echostep_app.offline.floors.stays import height_record
 from echostep_app.output.table import Table
 from echostep_simulation.devices.board_sensors import PRESSURE_NOISE_PA, Mode
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import Row, by_name, means, named
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simulation.air_pressure import Weather, device_temperatures, pressures
 from echostep_studies.simulation.vertical_day import VerticalMove, climb
@@ -122,10 +122,9 @@ def longest_s(t_s: Floats, wrong: Bools) -> float:
 
 
 def _summary(rows: Sequence[FloorRun]) -> Row:
-    right, strict = [row.floor_right for row in rows], [row.strict_right for row in rows]
     return {
-        "name": rows[0].name, "runs": len(rows), "floor_right": round(sum(right) / len(right), 5),
-        "strict_right": round(sum(strict) / len(strict), 5), "worst_right": round(min(right), 5),
+        **named(rows), **means(rows, ("floor_right", "strict_right"), 5),
+        "worst_right": round(min(row.floor_right for row in rows), 5),
         "longest_wrong_s": round(max(row.longest_wrong_s for row in rows), 5),
         "late_runs": sum(row.longest_wrong_s > 10.0 for row in rows), "changes": sum(row.changes for row in rows),
     }  # fmt: skip
@@ -137,4 +136,4 @@ def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     return [Table(title, shown, COLUMNS)]
 
 
-STUDY = Study("floors", (FloorRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)
+STUDY = Study("floors", (FloorRun,), one_run, by_name(_summary), _tables)

@@ -8,9 +8,10 @@ Owns the conversion of rows to dictionaries.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
+from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from msgspec import UNSET
@@ -19,6 +20,8 @@ from echostep.errors import EchostepError
 from echostep_app.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]  # the columns of a row by name: every summary row is one
+
+Summaries = Mapping[type, Callable[[list[Any]], Row]]  # of rows of one name, by their dataclass
 
 LOST_END_M = 3.0  # error at the end of a run above which the run counts as lost: a definition
 
@@ -52,6 +55,31 @@ def rows_by_name(rows: Iterable[NamedRow]) -> list[list[NamedRow]]:
     return list(groups.values())
 
 
+def by_name(summarize: Callable[[list[NamedRow]], Row]) -> Callable[[Iterable[NamedRow]], list[Row]]:
+    """What makes the summary row of each name from the rows of all runs; `summarize`: the rows of one name -> its summary row."""
+    return lambda rows: [summarize(group) for group in rows_by_name(rows)]
+
+
+def by_kind(summaries: Summaries) -> Callable[[Iterable[Any]], list[Row]]:
+    """The same where the rows of different names are of different dataclasses, each with its own function."""
+    return by_name(lambda group: summaries[type(group[0])](group))
+
+
+def named(rows: Sequence[Named]) -> Row:
+    """Name and number of rows of one name: the first columns of their summary row."""
+    return {"name": rows[0].name, "runs": len(rows)}
+
+
+def means(rows: Sequence[Any], keys: Iterable[str], digits: int | None = None) -> Row:
+    """The mean of each of these columns over the rows that have it, rounded to so many digits; without a column that no row has."""
+    columns = {key: [value for row in rows if (value := getattr(row, key)) is not UNSET] for key in keys}
+    return {
+        key: fmean(values) if digits is None else round(fmean(values), digits)
+        for key, values in columns.items()
+        if values
+    }
+
+
 def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside95: Sequence[Sequence[bool]]) -> Row:
     """The summary row of the errors at the steps of each run, (runs, steps), in the form of [Girard 2011, Table 1].
 
@@ -63,12 +91,9 @@ def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside
     whole = error_statistics([error for errors in errors_m for error in errors])
     steps = [bool(x) for run in inside95 for x in run]
 
-    def mean(key: str) -> float:
-        return round(sum(getattr(run, key) for run in each) / len(each), 4)
-
     return {
-        "name": name, "profile": profile, "runs": len(each), "mean_m": mean("mean_m"), "sd_m": mean("sd_m"),
-        "max_m": mean("max_m"), "min_m": mean("min_m"), "ending_m": mean("ending_m"), "ce50_m": round(whole.median_m, 4),
+        "name": name, "profile": profile, "runs": len(each),
+        **means(each, ("mean_m", "sd_m", "max_m", "min_m", "ending_m"), 4), "ce50_m": round(whole.median_m, 4),
         "ce95_m": round(whole.p95_m, 4), "worst_m": round(whole.max_m, 4),
         "coverage95": round(sum(steps) / len(steps), 4) if steps else None,
         "lost": sum(errors[-1] > LOST_END_M for errors in errors_m),
@@ -86,8 +111,9 @@ def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapp
 
 
 def write_parquet(path: Path, rows: Sequence[Row]) -> None:
-    """One record per row, for pandas, DuckDB or Arrow."""
+    """One record per row, for pandas, DuckDB or Arrow; a column that a row lacks is null there."""
     import pyarrow
     import pyarrow.parquet
 
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(list(rows)), path)
+    columns = dict.fromkeys(key for row in rows for key in row)
+    pyarrow.parquet.write_table(pyarrow.table({key: [row.get(key) for row in rows] for key in columns}), path)

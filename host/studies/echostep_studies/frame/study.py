@@ -42,8 +42,8 @@ class Study(Generic[RunRow, SummaryRow]):
     `tables`: summary rows -> tables. `draw`: pictures from the folder, the first seed and the summary rows. `draw_runs`: from the folder and the
     rows of all runs.
     `runs`: how many the tables and the JSON file state, where a study counts them itself; None: those of the request.
-    `seeds`: arguments of `run`; None: `request.seed` + 0 ... `request.runs` - 1. `journal`: False for a short study of one
-    run, which is done in this process. `parquet`: which rows the Parquet file holds, if one is written.
+    `seeds`: arguments of `run`; None: `request.seed` + 0 ... `request.runs` - 1. `parquet`: which rows the Parquet file holds; None: a short study
+    of one run, which is done in this process, without journal and Parquet file.
     """
 
     name: str
@@ -55,7 +55,6 @@ class Study(Generic[RunRow, SummaryRow]):
     draw_runs: Callable[[Path, list[RunRow]], None] | None = None
     runs: int | None = None
     seeds: range | None = None
-    journal: bool = True
     parquet: Literal["runs", "summary"] | None = "runs"
 
 
@@ -82,7 +81,7 @@ def run_study(study: Study[RunRow, SummaryRow], request: StudyRequest) -> list[S
 def _rows(study: Study[RunRow, SummaryRow], request: StudyRequest) -> list[RunRow]:
     """Rows of all runs in order of their seeds."""
     seeds = study.seeds if study.seeds is not None else range(request.seed, request.seed + request.runs)
-    if not study.journal:
+    if study.parquet is None:
         return [row for seed in seeds for row in study.run(seed)]
     return SeededRuns(
         study.name, len(seeds), seeds.start, study.run, request.out, study.kinds, request.scheduler

@@ -7,7 +7,7 @@ and limits of the data sheets, steps smoother than real ones; the firmware has n
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from echostep_app.commissioning.imu_errors import fit_errors, pose_of
 from echostep_simulation.devices.foot_board import MODEL
 from echostep_simulation.devices.mtx import MtxModel, means, measure, specific_force_and_rate
 from echostep_simulation.people.walker import RATE_HZ, Person, Walk, walk
+from echostep_studies.bench.recordings.foot_metrics import from_true_start
+from echostep_studies.girard2011.study import MethodRun
 from echostep_studies.simulation.sites import otb
 
 PACES = {"walking": Person(), "hurried": Person(stride_m=1.9, stride_s=0.8)}  # 1.2 and 2.4 m/s; assumed
@@ -27,28 +29,19 @@ SMALL_MTX_M_S2 = 50.0  # full scale of the MTx version of 5 g [Xsens MT0100P, 4.
 LEAN_RAD = 0.05  # of each side on which the part lies; assumed
 SIDES_RPY_RAD = np.pi / 2.0 * np.array([(0, 0, 0), (2, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
 POSE_MS = 2500  # as in `echostep calibrate accelerometers`
+PROFILE = "kits"  # of all rows
 Samples = tuple[Floats, Floats, Floats]  # t_s (n,), accel, gyro (n, 3)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KitRun:
-    """A kit on a walk: its errors after each step, and whether its ellipses held the truth, if it states any."""
-
-    name: str
-    seed: int
-    errors_m: list[float]
-    inside95: list[bool]
-
-
-def rows(seed: int) -> list[KitRun]:
+def rows(seed: int) -> list[MethodRun]:
     """Each device at each pace, on the same steps."""
-    runs: list[KitRun] = []
+    runs: list[MethodRun] = []
     waypoints = tuple((float(x), float(y)) for x, y in otb().route)
     for pace, person in PACES.items():
         walked = walk(waypoints, person, np.random.default_rng([seed, 11]))
         for name, (samples, noise) in devices(walked, seed).items():
-            errors = errors_m(walked, samples, noise)
-            runs.append(KitRun(name=f"foot alone, {pace}, {name}", seed=seed, errors_m=errors, inside95=[]))
+            errors, label = errors_m(walked, samples, noise), f"foot alone, {pace}, {name}"
+            runs.append(MethodRun(name=label, profile=PROFILE, seed=seed, errors_m=errors, inside95=[]))
     return runs
 
 
@@ -102,9 +95,7 @@ def errors_m(walked: Walk, samples: Samples, noise: Noise) -> list[float]:
     track = walk_track(*samples, noise=noise)
     ends = np.array([step.t_end_s for step in track.steps])
     at = np.searchsorted(track.t_s, ends).clip(max=len(track.t_s) - 1)
-    yaw = walked.foot_rpy_rad[0, 2]
-    c, s = np.cos(yaw), np.sin(yaw)
-    estimated = track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
+    estimated = from_true_start(track, walked, at)
     true = walked.foot_m[(ends * RATE_HZ).astype(int).clip(max=len(walked.foot_m) - 1), :2]
     errors: list[float] = np.hypot(*(estimated - true).T).tolist()
     return errors

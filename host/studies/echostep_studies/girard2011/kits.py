@@ -17,11 +17,11 @@ from echostep.echoes.rangers import ECHO_OF
 from echostep_app.output.table import Table
 from echostep_simulation.devices.srf02 import HALF_US
 from echostep_simulation.world.acoustics import MAXSONAR, PULSE_RANGER, SRF02, Acoustics
-from echostep_studies.frame.report import Row, as_dicts, rows_by_name, summary
+from echostep_studies.frame.report import Row, as_dicts, by_name
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.girard2011 import kit_feet
-from echostep_studies.girard2011.kit_feet import KitRun
-from echostep_studies.girard2011.study import COLUMNS, MethodOutput, default, girard
+from echostep_studies.girard2011.kit_feet import PROFILE
+from echostep_studies.girard2011.study import COLUMNS, MethodRun, default, girard, method_run, summarize
 from echostep_studies.papers.girard2011 import GirardSettings
 from echostep_studies.simulation.marker_walk import MarkerWalk, lay_markers, walk_markers
 from echostep_studies.simulation.sites import SimulatedSite, furnished, otb
@@ -56,17 +56,16 @@ def kinds() -> dict[str, RangerKind]:
     }
 
 
-def one_run(seed: int) -> list[KitRun]:
+def one_run(seed: int) -> list[MethodRun]:
     """Both filters with each kind of ranger on the paper's site, and the default filter among furniture."""
-    rows: list[KitRun] = []
+    rows: list[MethodRun] = []
     for name, kind in kinds().items():
-        site = otb()
-        walk = _walk(site, seed, kind)
-        rows.append(_row(f"paper's filter, {name}", seed, walk, list(girard(site, walk, seed, settings=kind.girard))))
-        rows.append(_row(f"default, {name}", seed, walk, list(default(site, walk, seed, kind.echo))))
-        site = furnished(seed)
-        walk = _walk(site, seed, kind)
-        rows.append(_row(f"default, furniture, {name}", seed, walk, list(default(site, walk, seed, kind.echo))))
+        for site, ours in ((otb(), "default"), (furnished(seed), "default, furniture")):
+            walk = _walk(site, seed, kind)
+            outputs = {f"{ours}, {name}": default(site, walk, seed, kind.echo)}
+            if ours == "default":
+                outputs = {f"paper's filter, {name}": girard(site, walk, seed, settings=kind.girard)} | outputs
+            rows += [method_run(row, PROFILE, seed, walk, seen) for row, seen in outputs.items()]
     return rows + kit_feet.rows(seed)
 
 
@@ -74,21 +73,9 @@ def _walk(site: SimulatedSite, seed: int, kind: RangerKind) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers, None, kind.acoustics, kind.half_s)
 
 
-def _row(name: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> KitRun:
-    errors = [
-        math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
-    ]
-    inside = [s.inside for s in seen if s.inside is not None]
-    return KitRun(name=name, seed=seed, errors_m=errors, inside95=inside)
-
-
-def _summary(runs: list[KitRun]) -> Row:
-    return summary(runs[0].name, "kits", [r.errors_m for r in runs], [r.inside95 for r in runs])
-
-
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"Position error in metres by kind of ranger, and of the foot alone, {request.runs} simulated runs; only SRF02 and MTx were ever worn"
-    return [Table(title, as_dicts(sorted(rows, key=lambda row: row.name.split(", ")[:-1])), COLUMNS)]
+    return [Table(title, as_dicts(sorted(rows, key=lambda row: row["name"].split(", ")[:-1])), COLUMNS)]
 
 
-STUDY = Study("kits", (KitRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)
+STUDY = Study("kits", (MethodRun,), one_run, by_name(summarize), _tables)

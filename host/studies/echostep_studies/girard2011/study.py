@@ -7,7 +7,7 @@ In: seeds. Out: rows in the form of the paper's Table 1, and the clouds of its F
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import Row, as_dict, rows_by_name, summary
+from echostep_studies.frame.report import Row, as_dict, by_name, means, summary
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.papers.girard2011 import Girard, GirardSettings
 from echostep_studies.simulation.marker_walk import STEP_M, ImuModel, MarkerWalk, lay_markers, walk_markers
@@ -118,12 +118,12 @@ def one_run(seed: int) -> list[MethodRun]:
     """All systems on the walk of this seed, and the default filter on every other site."""
     site = otb()
     walk = _walk(site, seed)
-    rows = [_row(name, "girard2011", seed, walk, list(system(site, walk, seed))) for name, system in SYSTEMS.items()]
-    rows.append(_row("default", "default", seed, walk, list(default(site, walk, seed))))
+    rows = [method_run(name, "girard2011", seed, walk, system(site, walk, seed)) for name, system in SYSTEMS.items()]
+    rows.append(method_run("default", "default", seed, walk, default(site, walk, seed)))
     for name, build in SITES.items():
         site = build(seed)
         walk = _walk(site, seed)
-        row = _row(f"default/{name}", "default", seed, walk, list(default(site, walk, seed)))
+        row = method_run(f"default/{name}", "default", seed, walk, default(site, walk, seed))
         rows.append(_in_hall(walk, row) if name == "hall" else row)
     return rows
 
@@ -201,10 +201,10 @@ def _walk(site: SimulatedSite, seed: int) -> MarkerWalk:
     return walk_markers(lay_markers(site.route), site.built, seed, site.passers)
 
 
-def _row(name: str, profile: str, seed: int, walk: MarkerWalk, seen: list[MethodOutput]) -> MethodRun:
-    errors = [
-        math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, walk.trunk_m[1:].tolist(), strict=True)
-    ]
+def method_run(name: str, profile: str, seed: int, walk: MarkerWalk, outputs: Iterable[MethodOutput]) -> MethodRun:
+    """The row of a method with these outputs."""
+    seen, true = list(outputs), walk.trunk_m[1:].tolist()
+    errors = [math.hypot(s.at_m[0] - x, s.at_m[1] - y) for s, (x, y) in zip(seen, true, strict=True)]
     inside = [s.inside for s in seen if s.inside is not None]
     return MethodRun(name=name, profile=profile, seed=seed, errors_m=errors, inside95=inside)
 
@@ -225,16 +225,11 @@ def _in_hall(walk: MarkerWalk, run: MethodRun) -> HallRun:
     )
 
 
-def _summary(runs: list[MethodRun]) -> Row:
+def summarize(runs: list[MethodRun]) -> Row:
+    """The summary row of one name."""
     row = summary(runs[0].name, runs[0].profile, [r.errors_m for r in runs], [r.inside95 for r in runs])
     halls = [r for r in runs if isinstance(r, HallRun)]
-    if not halls:
-        return row
-    return {
-        **row, "hall_growth_m": round(sum(r.hall_growth_m for r in halls) / len(halls), 4),
-        "foot_growth_m": round(sum(r.foot_growth_m for r in halls) / len(halls), 4),
-        "after_10s_m": round(sum(r.after_10s_m for r in halls) / len(halls), 4),
-    }  # fmt: skip
+    return row | (means(halls, ("hall_growth_m", "foot_growth_m", "after_10s_m"), 4) if halls else {})
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
@@ -248,7 +243,7 @@ STUDY = Study(
     "girard2011",
     (MethodRun, HallRun),
     one_run,
-    lambda rows: [_summary(group) for group in rows_by_name(rows)],
+    by_name(summarize),
     _tables,
     draw,
 )

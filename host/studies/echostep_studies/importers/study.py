@@ -72,7 +72,6 @@ def importers_study(folder: Path) -> Study[ImportRow, ImportRow]:
         _tables,
         runs=len(files),
         seeds=range(1),
-        journal=False,
         parquet=None,
     )
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.report import Row, Summaries, by_kind, named
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.incapacity import falls
 
@@ -43,28 +43,26 @@ class DayRun:
 RunRow = LyingRun | DayRun | falls.FallRun | falls.NoFallRun
 
 
-def summarize(rows: Sequence[RunRow]) -> list[Row]:
-    """One row for each name; those of falls last."""
-    lying = rows_by_name(row for row in rows if isinstance(row, LyingRun))
-    days = rows_by_name(row for row in rows if isinstance(row, DayRun))
-    fell = [row for row in rows if isinstance(row, (falls.FallRun, falls.NoFallRun))]
-    return [*map(_lying_summary, lying), *map(_day_summary, days), *falls.summarize(fell)]
-
-
 def _lying_summary(group: Sequence[LyingRun]) -> Row:
     told_s = [row.told_s for row in group]
     in_time, median_s = sum(row.told for row in group), float(np.median(told_s))
-    return {
-        "name": group[0].name, "runs": len(group), "told": in_time, "median_s": median_s, "longest_s": max(told_s),
-    }  # fmt: skip
+    return named(group) | {"told": in_time, "median_s": median_s, "longest_s": max(told_s)}
 
 
 def _day_summary(group: Sequence[DayRun]) -> Row:
     hours, maydays = sum(row.hours for row in group), sum(row.maydays for row in group)
-    return {
-        "name": group[0].name, "runs": len(group), "hours": hours, "asked": sum(row.asked for row in group), "maydays": maydays,
-        "per_8h": 8.0 * maydays / hours,
-    }  # fmt: skip
+    asked = sum(row.asked for row in group)
+    return named(group) | {"hours": hours, "asked": asked, "maydays": maydays, "per_8h": 8.0 * maydays / hours}
+
+
+SUMMARIES: Summaries = {LyingRun: _lying_summary, DayRun: _day_summary, **falls.SUMMARIES}
+ORDER = (*falls.KITS, "recorded")  # of the rows of falls, which come last
+
+
+def summarize(rows: Sequence[RunRow]) -> list[Row]:
+    """One row for each name."""
+    first = {name: k for k, name in enumerate(ORDER)}
+    return sorted(by_kind(SUMMARIES)(rows), key=lambda row: first.get(row["name"].split(":")[0], -1))
 
 
 def tables(rows: Sequence[Row], _: StudyRequest) -> list[Table]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from echostep.path import PathSegment
 from echostep_app.wearer.falls import STRIDE_M, Fall
 from echostep_app.wearer.wearer_signs import WearerSigns
 from echostep_studies.bench.recordings.feet import SETS as FEET
+from echostep_studies.bench.recordings.legs import qmt_sensors
 from echostep_studies.frame.recordings import Sets, read_sets
 from echostep_studies.incapacity.falls import MESSAGES_HZ, NoFallRun, message_index
 
@@ -50,17 +51,11 @@ class TrunkRecording(NamedTuple):
 
 def _qmt(path: Path) -> Iterator[TrunkRecording]:
     """Hip and lower back of one person, each with either leg [Laidig 2023]."""
-    from scipy.io import loadmat
-
-    mat: dict[str, Any] = loadmat(path)
-
-    def sensor(part: str, name: str) -> Floats:
-        return np.asarray(mat[part][name][0, 0], np.float64)
-
+    t_s, sensor = qmt_sensors(path)
     for place, side in (("lower_back", "left"), ("hip", "right")):
         foot = sensor(f"foot_{side}", "acc"), sensor(f"foot_{side}", "gyr")
         thigh = sensor(f"upper_leg_{side}", "acc")
-        yield TrunkRecording(mat["t"].ravel(), sensor(place, "acc"), sensor(place, "gyr"), thigh, foot)
+        yield TrunkRecording(t_s, sensor(place, "acc"), sensor(place, "gyr"), thigh, foot)
 
 
 def _chest(path: Path) -> Iterator[TrunkRecording]:

@@ -20,7 +20,7 @@ from echostep_app.output.table import Table
 from echostep_app.wearer.alarm import WearerAlarm
 from echostep_app.wearer.falls import Fall
 from echostep_app.wearer.wearer_signs import Sign, WearerSigns
-from echostep_studies.frame.report import Row, as_dicts, rows_by_name
+from echostep_studies.frame.report import Row, Summaries, as_dicts, named
 from echostep_studies.simulation.body_motion import ICM20649, MTX, SensorPart
 from echostep_studies.simulation.falling import FALLS, NO_FALLS, STRIDE_M, BodySamples, walk_then
 
@@ -101,20 +101,11 @@ def _foot(kit: str) -> SensorPart:
     return MTX if kit == "MTx alone" else ICM20649
 
 
-def summarize(rows: Sequence[FallRun | NoFallRun]) -> list[Row]:
-    """One row for each kit and manner, in order of the kits; recordings last."""
-    made: list[Row] = []
-    for group in rows_by_name(rows):
-        falls = [row for row in group if isinstance(row, FallRun)]
-        made.append(_told(falls) if falls else _claimed([row for row in group if isinstance(row, NoFallRun)]))
-    return sorted(made, key=lambda row: [*KITS, "recorded"].index(row["name"].split(":")[0]))
-
-
 def _told(group: Sequence[FallRun]) -> Row:
     asked = [row.asked_s for row in group if row.asked_s is not None]
     maydays = [row.mayday_s for row in group if row.mayday_s is not None]
-    return {
-        "name": group[0].name, "runs": len(group), "told": len(asked), "early": sum(row.early for row in group),
+    return named(group) | {
+        "told": len(asked), "early": sum(row.early for row in group),
         "median_s": float(np.median(asked)) if asked else UNSET, "longest_s": max(asked, default=UNSET),
         "mayday_s": max(maydays, default=UNSET),
     }  # fmt: skip
@@ -123,13 +114,14 @@ def _told(group: Sequence[FallRun]) -> Row:
 def _claimed(group: Sequence[NoFallRun]) -> Row:
     hours = [row.hours for row in group if row.hours is not UNSET]
     claimed = sum(row.claimed for row in group)
-    return {
-        "name": group[0].name, "runs": len(group), "claimed": claimed, "watched_h": sum(hours) if hours else UNSET,
-    }  # fmt: skip
+    return named(group) | {"claimed": claimed, "watched_h": sum(hours) if hours else UNSET}
+
+
+SUMMARIES: Summaries = {FallRun: _told, NoFallRun: _claimed}
 
 
 def tables(rows: Sequence[Row]) -> list[Table]:
-    """Tables of the rows of `summarize`."""
+    """Tables of the summary rows of falls, and of what is none."""
     fell = {
         "name": "", "runs": "falls", "told": "told as a fall", "early": "claims before", "median_s": "asked after, median s",
         "longest_s": "longest s", "mayday_s": "mayday after, longest s",

@@ -202,6 +202,5 @@ def incapacity_study(days: int, data: Path | None, first: int) -> Study[RunRow, 
         partial(one_run, days, data or DATA, first),
         summarize,
         tables,
-        journal=False,
         parquet=None,
     )

@@ -1,25 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""`echostep evaluate legs`: walks of about 5 m by many simulated people, legs known, no calibration, and what each fault of the sensors does.
+"""The rows `legs/slow`, ...: walks of about 5 m by many simulated people, legs known, no calibration, and what each fault of the sensors does.
 
 In: seeds, a person each. Out: rows `{name, pace, cause, runs, bias_percent, sd_percent, mean_abs_percent, worst_percent}`. Owns the causes.
-The people walk by joint curves of their own (`gaits`), which know nothing of the estimator. Signs and sample's phase are drawn.
+The people walk by joint curves of their own (`simulation.joint_gait`), which know nothing of the estimator. Signs and sample's phase are drawn.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.kinematics import LegLengths
-from echostep.legs.stride import StrideSettings
+from echostep.legs.stride import Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
 from echostep_app.offline.leg_gyros import repair_clipping
 from echostep_app.output.table import Table
-from echostep_studies.frame.report import Row, rows_by_name
-from echostep_studies.frame.study import Study, StudyRequest
+from echostep_simulation.people.leg_angles import LegDimensions
+from echostep_studies.frame.parts import Part
+from echostep_studies.frame.report import Row, named
+from echostep_studies.frame.study import StudyRequest
 from echostep_studies.simulation.joint_gait import (
     FAST,
     NATURAL,
@@ -59,6 +62,7 @@ CAUSES = {
     "15 degrees aslant": LegSensors(aslant_rad=math.radians(15.0)),
     "50 Hz, noise 0.03 rad/s": LegSensors(rate_hz=50.0, noise_rad_s=0.03),
 }
+WALKS = {f"legs/{pace}" + (f", {cause}" if cause else ""): (pace, cause) for pace in PACES for cause in CAUSES}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,22 +70,19 @@ class PersonRun:
     """The error of one walk."""
 
     name: str
-    pace: str
-    cause: str
     seed: int
     error_percent: float
 
 
-def one_run(seed: int) -> list[PersonRun]:
-    """One person at every pace, with every cause."""
+def people_rows(names: Sequence[str], seed: int) -> list[PersonRun]:
+    """One person at the paces and with the causes of these names."""
     person = draw_person(np.random.default_rng([seed, 50]))
+    gaits = {pace: five_metres(person, PACES[pace], seed) for pace in dict.fromkeys(WALKS[name][0] for name in names)}
     rows = []
-    for pace, manner in PACES.items():
-        gait = five_metres(person, manner, seed)
-        for cause, sensors in CAUSES.items():
-            error = 100.0 * (measured_m(gait, person, sensors, seed) / float(gait.way_m[-1]) - 1.0)
-            name = f"legs/{pace}" + (f", {cause}" if cause else "")
-            rows.append(PersonRun(name=name, pace=pace, cause=cause, seed=seed, error_percent=error))
+    for name in names:
+        pace, cause = WALKS[name]
+        error = 100.0 * (measured_m(gaits[pace], person, CAUSES[cause], seed) / float(gaits[pace].way_m[-1]) - 1.0)
+        rows.append(PersonRun(name=name, seed=seed, error_percent=error))
     return rows
 
 
@@ -108,23 +109,30 @@ def measured_m(gait: SimulatedGait, person: JointGaitPerson, sensors: LegSensors
     rates = math.cos(sensors.aslant_rad) * rng.choice([-1.0, 1.0], 2) * true
     rates += sensors.bias_rad_s * rng.standard_normal(2) + sensors.noise_rad_s * rng.standard_normal(rates.shape)
     rates = np.clip(rates, -sensors.range_rad_s, sensors.range_rad_s)
-    legs = StrideEstimator(StrideSettings(LegLengths(person.leg.thigh_m, person.leg.shank_m)))
     thigh, shank = repair_clipping(t_s, rates).T
-    return sum(s.length_m for s in (*legs.feed(t_s, thigh, shank), *legs.finish()))
+    return sum(stride.length_m for stride in strides_of(person.leg, t_s, thigh, shank))
 
 
-def _summary(rows: list[PersonRun]) -> Row:
-    first, errors = rows[0], np.array([row.error_percent for row in rows])
-    return {
-        "name": first.name, "pace": first.pace, "cause": first.cause, "runs": len(rows),
-        "bias_percent": round(float(errors.mean()), 2), "sd_percent": round(float(errors.std()), 2),
+def strides_of(
+    leg: LegDimensions, t_s: Floats, thigh: Floats, shank: Floats, sign: tuple[float, float] | None = None
+) -> list[Stride]:
+    """Strides of a leg of known lengths from the rates of its gyros (n,); `sign`: of the gyros, where it is known."""
+    legs = StrideEstimator(StrideSettings(LegLengths(leg.thigh_m, leg.shank_m)), sign)
+    return [*legs.feed(t_s, thigh, shank), *legs.finish()]
+
+
+def _summary(rows: Sequence[PersonRun]) -> Row:
+    (pace, cause), errors = WALKS[rows[0].name], np.array([row.error_percent for row in rows])
+    return named(rows) | {
+        "pace": pace, "cause": cause, "bias_percent": round(float(errors.mean()), 2), "sd_percent": round(float(errors.std()), 2),
         "mean_abs_percent": round(float(np.abs(errors).mean()), 2), "worst_percent": round(float(np.abs(errors).max()), 2),
     }  # fmt: skip
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     title = f"About {WAY_M:g} m by {request.runs} people, legs known, no calibration (simulated)"
-    return [Table(title, rows, COLUMNS, ("Error of the distance from standing to standing.",))]
+    shown = [row for row in rows if "bias_percent" in row]
+    return [Table(title, shown, COLUMNS, ("Error of the distance from standing to standing.",))]
 
 
-STUDY = Study("legs", (PersonRun,), one_run, lambda rows: [_summary(group) for group in rows_by_name(rows)], _tables)
+PART = Part(list(WALKS), people_rows, {PersonRun: _summary}, _tables)

@@ -25,7 +25,7 @@ from echostep_app.offline.leg_track import track_default
 from echostep_app.output.table import Table
 from echostep_studies.bench.recordings.legs import SETS, LegRecording
 from echostep_studies.frame.recordings import recordings_in
-from echostep_studies.frame.report import as_dicts
+from echostep_studies.frame.report import Row, as_dicts
 from echostep_studies.frame.study import Study, StudyRequest
 
 NOTHING, LENGTHS, SCALE = "nothing", "leg lengths", "first 20 m"
@@ -55,34 +55,17 @@ class LegRow:
     stairs: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LegMeans:
-    """Of a method: mean absolute errors, the rms of error / sd, all strides that were read as stairs."""
-
-    set: str
-    recording: str
-    known: str
-    walked_m: float
-    error_m: float
-    error_percent: float
-    error_over_sd: float | None
-    found_m: None = None
-    sd_m: None = None
-    stairs: int
-
-
-def recordings_study(folder: Path) -> Study[LegRow, LegRow | LegMeans]:
+def recordings_study(folder: Path) -> Study[LegRow, Row]:
     """The study of the recordings in this folder; raises EchostepError without any."""
     recordings = recordings_in(folder, SETS)
     return Study(
         "legs-recordings",
         (LegRow,),
         lambda _seed: [row for legs in (*((r,) for r in recordings), *pairs(recordings)) for row in rows_of(*legs)],
-        lambda rows: [*rows, *means(rows)],
+        lambda rows: [*as_dicts(rows), *method_means(rows)],
         _tables,
         runs=1,
         seeds=range(1),
-        journal=False,
         parquet=None,
     )
 
@@ -157,29 +140,26 @@ def _row(recording: LegRecording, known: str, strides: tuple[Stride, ...], begin
     )
 
 
-def means(rows: list[LegRow]) -> list[LegMeans]:
-    """The means of each method."""
-    mean_rows = []
+def method_means(rows: Sequence[LegRow]) -> list[Row]:
+    """Of each method: mean absolute errors, the rms of error / sd, all strides that were read as stairs."""
+    summaries = []
     for known in (known + words for words in ("", BOTH) for known in (NOTHING, LENGTHS, SCALE)):
         same = [row for row in rows if row.known == known]
         if not same:
             continue
         ratios = [row.error_over_sd for row in same if row.error_over_sd is not None]
-        mean_rows.append(
-            LegMeans(
-                set="all",
-                recording=f"mean absolute of {len(same)}, rms of error / sd",
-                known=known,
-                walked_m=round(fmean(abs(row.walked_m) for row in same), 3),
-                error_m=round(fmean(abs(row.error_m) for row in same), 3),
-                error_percent=round(fmean(abs(row.error_percent) for row in same), 3),
-                error_over_sd=round(math.sqrt(fmean(r * r for r in ratios)), 2) if ratios else None,
-                stairs=sum(row.stairs for row in same),
-            )
-        )
-    return mean_rows
+        sizes = {
+            key: round(fmean(abs(getattr(row, key)) for row in same), 3)
+            for key in ("walked_m", "error_m", "error_percent")
+        }
+        summaries.append({
+            "set": "all", "recording": f"mean absolute of {len(same)}, rms of error / sd", "known": known, **sizes,
+            "error_over_sd": round(math.sqrt(fmean(r * r for r in ratios)), 2) if ratios else None,
+            "stairs": sum(row.stairs for row in same),
+        })  # fmt: skip
+    return summaries
 
 
-def _tables(rows: list[LegRow | LegMeans], _request: StudyRequest) -> list[Table]:
+def _tables(rows: list[Row], _request: StudyRequest) -> list[Table]:
     note = "Real legs, one setting for all. known: what was known of the wearer; after the first 20 m only the rest is judged."
-    return [Table("Legs on real recordings against the way of both feet", as_dicts(rows), COLUMNS, (note,))]
+    return [Table("Legs on real recordings against the way of both feet", rows, COLUMNS, (note,))]

@@ -19,7 +19,7 @@ from echostep.arrays import Bools, Floats
 from echostep_app.mapping.graph.graph import Closure
 from echostep_app.mapping.graph.levels import BETWEEN
 from echostep_app.mapping.mapper import Mapped
-from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, Z
+from echostep_studies.bench.walks import SimulatedWalk, T, Z
 
 COURSE_M = 15.0  # the trunk's place over the foot errs by 4 cm, 0.2 degrees of it
 SAMPLE_M = 0.05  # along walls
@@ -53,7 +53,7 @@ class PathColumns:
     max_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class StoreyColumns:
     """Share of the nodes on a level that are drawn on another one, and how many storeys are drawn of how many walked."""
 
@@ -62,7 +62,7 @@ class StoreyColumns:
     storeys_walked: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class WallColumns:
     """Errors of the drawn walls, if there are any, which of the walls that were passed are drawn, and what is drawn where nothing is."""
 
@@ -73,18 +73,13 @@ class WallColumns:
     drawn_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class ClosureColumns:
     """Closures, those that are wrong, and nodes."""
 
     closures: int
     wrong: int
     nodes: int
-
-
-def true_path(walk: SimulatedWalk, t_s: Floats) -> Floats:
-    """True places (n, 2) at times (n,)."""
-    return np.column_stack([np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y)])
 
 
 def known_start(path: Floats, truth: Floats) -> WalkFrame:
@@ -103,11 +98,6 @@ def path_columns(path: Floats, truth: Floats) -> PathColumns:
     return PathColumns(rmse_m=float(np.sqrt(np.mean(error**2))), max_m=float(error.max()))
 
 
-def heights_m(walk: SimulatedWalk, t_s: Floats) -> Floats:
-    """True heights of the floor (n,) at times (n,)."""
-    return np.interp(t_s, walk.truth[:, T], walk.truth[:, Z])
-
-
 def levels_of(mapped: Mapped, walk: SimulatedWalk) -> list[int]:
     """The true level of each drawn storey: the nearest one in height above the start."""
     storeys, start = mapped.graph.levels, float(walk.truth[0, Z])
@@ -118,7 +108,7 @@ def levels_of(mapped: Mapped, walk: SimulatedWalk) -> list[int]:
 
 def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> StoreyColumns:
     """The storeys of a drawing."""
-    z = heights_m(walk, mapped.graph.nodes.t_s)
+    z = walk.heights_at(mapped.graph.nodes.t_s)
     on = np.array([np.abs(z - level.height_m) < LEVEL_M for level in walk.built.levels])
     storey = mapped.graph.level_of(np.arange(len(z)))
     level = np.array(levels_of(mapped, walk))[np.maximum(storey, 0)]
@@ -131,7 +121,7 @@ def storey_columns(mapped: Mapped, walk: SimulatedWalk) -> StoreyColumns:
 def wall_columns(drawn: Sequence[Floats], walk: SimulatedWalk) -> WallColumns:
     """The drawn walls (n, 4) of each level in the map."""
     t_s = np.arange(walk.truth[0, T], walk.truth[-1, T], LOOK_S)
-    looks, z = true_path(walk, t_s), heights_m(walk, t_s)
+    looks, z = walk.places_at(t_s), walk.heights_at(t_s)
     away, missed = [], []
     for level, walls in zip(walk.built.levels, drawn, strict=True):
         true = sampled(level.solid)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The study `noplan`: each building drawn from one walk, beside the foot alone and FootSLAM on the same path; another person tracked on the drawing.
+"""The study `noplan`: each building drawn from one walk, beside the foot alone and FootSLAM on the same path; another person tracked on the drawing;
+the trails of [Fischer 2008], which have no plan.
 
 In: seeds; the public recordings for westport-house, real feet and real clutter. Out: the table, JSON, Parquet, a picture of each drawing of the
 first seed. Owns nothing.
@@ -10,14 +11,13 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from fnmatch import fnmatch
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Plan
 from echostep_app.mapping.graph.nodes import nodes_of
@@ -28,21 +28,21 @@ from echostep_studies.bench.filtering import Claim, track
 from echostep_studies.bench.judgement import TRACKING, TruePlaces, judge, true_levels
 from echostep_studies.bench.recordings import hallways
 from echostep_studies.bench.recordings.foot_metrics import rmse
-from echostep_studies.bench.sites import WESTPORT, Site
+from echostep_studies.bench.sites import Site, westport_in
 from echostep_studies.bench.walks import SimulatedWalk
+from echostep_studies.frame.parts import Part, study_of
 from echostep_studies.frame.report import Row, as_dict
 from echostep_studies.frame.study import Study, StudyRequest
-from echostep_studies.noplan import real_clutter, sites
-from echostep_studies.noplan.columns import DrawnRun, RunRow, SecondRun, summaries, tables
+from echostep_studies.frame.truth import at_times
+from echostep_studies.noplan import real_clutter, sites, trails
+from echostep_studies.noplan.columns import SUMMARIES, DrawnRun, RunRow, SecondRun, tables
 from echostep_studies.noplan.footslam import footslam
 from echostep_studies.noplan.judgement import (
     closure_columns,
-    heights_m,
     known_start,
     levels_of,
     path_columns,
     storey_columns,
-    true_path,
     wall_columns,
 )
 from echostep_studies.noplan.walks import walked
@@ -68,7 +68,7 @@ def _real_names(data: Path | None) -> list[str]:
     return [f"{kind}/{name}" for kind, names in known.items() for name in names]
 
 
-def one_run(names: tuple[str, ...], data: Path | None, pictures: Path, first: int, seed: int) -> list[RunRow]:
+def drawn_names(data: Path | None, pictures: Path, first: int, names: tuple[str, ...], seed: int) -> list[RunRow]:
     """The rows of these names for the walk of this seed; pictures for the first seed."""
     rows: list[RunRow] = []
     for name in names:
@@ -114,7 +114,7 @@ def drawn_row(
     mapped = map_walk(walk.segments)
     map_s = time.process_time() - begin_s
     nodes, pose = mapped.graph.nodes, mapped.graph.pose
-    truth, levels = true_path(walk, nodes.t_s), levels_of(mapped, walk)
+    truth, levels = walk.places_at(nodes.t_s), levels_of(mapped, walk)
     frame = known_start(pose[:, :2], truth)
     drawn = [np.zeros((0, 4))] * len(walk.built.levels)
     for level, drawing in zip(levels, mapped.drawings, strict=True):
@@ -129,8 +129,8 @@ def drawn_row(
     paths = {"": pose, "foot_": foot.pose, "footslam_": footslam(foot, np.random.default_rng([seed, 85]))}
     for of, path in paths.items():
         placed = known_start(path[:, :2], truth).to_map(path[:, :2])
-        at = np.column_stack([np.interp(at_s, nodes.t_s, placed[:, k]) for k in (0, 1)])
-        columns |= {of + key: value for key, value in as_dict(path_columns(at, true_path(walk, at_s))).items()}
+        at = at_times(at_s, nodes.t_s, placed)
+        columns |= {of + key: value for key, value in as_dict(path_columns(at, walk.places_at(at_s))).items()}
     row = DrawnRun(name=name, seed=seed, map_s=map_s, shape_m=rmse(pose[:, :2], truth), **columns)
     plan, walked_m = plan_in(mapped, frame.to_map, walk.pose_at(float(nodes.t_s[0])), name)
     if picture is not None:
@@ -161,8 +161,8 @@ def second_row(
 ) -> SecondRun:
     """The claims of another person against the truth, in the frame of the building."""
     t_s = np.array([c.t_s for c in claims])
-    truth = true_path(walk, t_s)
-    right = true_levels(truth, heights_m(walk, t_s), walk.built)[:, levels]
+    truth = walk.places_at(t_s)
+    right = true_levels(truth, walk.heights_at(t_s), walk.built)[:, levels]
     judged = judge(claims, TruePlaces(truth, right), np.zeros(len(t_s)))
     error = np.hypot(*(np.array([(c.x_m, c.y_m) for c in claims]) - truth).T)
     return SecondRun(
@@ -172,14 +172,8 @@ def second_row(
     )  # fmt: skip
 
 
-def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[RunRow, Row]:
+def noplan_study(data: Path | None, pattern: str, request: StudyRequest) -> Study[Any, Row]:
     """The study of the rows whose names match a pattern; `data`: folder of the public recordings."""
-    if data is not None and not (data / WESTPORT).is_file():
-        raise EchostepError(f"{data / WESTPORT}: not there: without --data its rows are left out")
-    every = names_of(data)
-    names = tuple(name for name in every if fnmatch(name, pattern))
-    if not names:
-        raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(every)}")
-    return Study(
-        "noplan", (DrawnRun, SecondRun), partial(one_run, names, data, request.out, request.seed), summaries, tables
-    )
+    westport_in(data)
+    run = partial(drawn_names, data, request.out, request.seed)
+    return study_of("noplan", (Part(names_of(data), run, SUMMARIES, tables), trails.PART), pattern)

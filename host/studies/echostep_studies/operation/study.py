@@ -28,7 +28,7 @@ from echostep_app.scorecard.card import FLOOR_PENALTY_M, match, score
 from echostep_app.scorecard.error_statistics import error_statistics, quantile
 from echostep_app.scorecard.track_columns import ScoredPath, track_of
 from echostep_studies.bench.judgement import true_levels
-from echostep_studies.frame.report import Row, as_dict, rows_by_name
+from echostep_studies.frame.report import Row, as_dict, by_name, named
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.operation.walks import HALF_M, OperationWalk, operation
 
@@ -134,7 +134,7 @@ def _summary(rows: Sequence[PartRun]) -> Row:
         np.concatenate([np.asarray(getattr(row, key)) for row in rows])
         for key in ("error_m", "above_m", "floors_off", "tied_right")
     )
-    summary: Row = {"name": rows[0].name, "runs": len(rows), "points": len(error)}
+    summary: Row = named(rows) | {"points": len(error)}
     if not len(error):
         return summary
     statistics = error_statistics(error)
@@ -181,6 +181,6 @@ def operation_study(half_m: float = HALF_M) -> Study[PartRun, Row]:
         "operation",
         (PartRun, WholeRun),
         partial(one_run, half_m),
-        lambda rows: [_summary(group) for group in rows_by_name(rows)],
+        by_name(_summary),
         _tables,
     )

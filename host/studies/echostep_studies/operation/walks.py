@@ -11,7 +11,6 @@ indoor habits: runs at 3 m/s, crawls at 0.5 m/s. The simulated body stays uprigh
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,6 @@ import numpy as np
 from echostep.arrays import Floats, spans
 from echostep.localization import Estimate, Start
 from echostep.plan import Plan
-from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.session.last_place import start_after
@@ -29,12 +27,11 @@ from echostep_simulation.scenario import START_NS, Scenario
 from echostep_simulation.world.tower import STOREY_M, tower
 from echostep_studies.bench.sites import LOBBY
 from echostep_studies.bench.tours import random_tour
+from echostep_studies.bench.walks import CORNER_M, tracked
 
 STOREYS = 3
 HALF_M = 400.0  # length of the way before the change of the battery, and of that after it: twenty minutes in all
 CHANGE_S = 60.0  # without any byte, while the wearer stands
-CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs
-PORTION = 1000  # chunks that the tracker gets at once
 WALK = Manner("walk", 1.3, 1.1)
 MANNERS = (
     WALK, Manner("run", 2.2, 0.74), WALK, Manner("backward", 0.9, 1.2, math.pi), WALK,
@@ -52,9 +49,9 @@ class OperationWalk:
 
     plan: Plan
     truth: Floats
-    before: tuple[Estimate, ...]
-    after: tuple[Estimate, ...]
-    resumed: tuple[Estimate, ...]
+    before: list[Estimate]
+    after: list[Estimate]
+    resumed: list[Estimate]
     restart_s: float
     manners: tuple[tuple[float, str], ...]
 
@@ -71,11 +68,11 @@ def operation(seed: int, half_m: float = HALF_M) -> OperationWalk:
     early = [c for c in chunks if c.t_arrival_ns < change_ns[0]]
     late = [c for c in chunks if c.t_arrival_ns >= change_ns[1]]
     first = Tracker(plan, scenario.start, seed=seed)
-    before, last = _tracked(first, early), first.last_place()
+    before, last = tracked(first, early), first.last_place()
     start = Start() if last is None else start_after(last, CHANGE_S, first.settings.climb)
     return OperationWalk(
-        plan, scenario.truth, before, _tracked(Tracker(plan, Start(), seed=seed), late),
-        _tracked(Tracker(plan, start, seed=seed), late), change_s + CHANGE_S, scenario.walk.manners,
+        plan, scenario.truth, before, tracked(Tracker(plan, Start(), seed=seed), late),
+        tracked(Tracker(plan, start, seed=seed), late), change_s + CHANGE_S, scenario.walk.manners,
     )  # fmt: skip
 
 
@@ -99,8 +96,3 @@ def _standing_s(truth: Floats, stop: Waypoint) -> float:
     still = np.hypot(truth[:, 1] - stop[0], truth[:, 2] - stop[1]) < 0.2
     begin, _ = max(spans(still), key=lambda stay: stay[1] - stay[0])
     return float(truth[begin, 0]) + 2.0
-
-
-def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> tuple[Estimate, ...]:
-    portions = (portion_of(chunks[k : k + PORTION]) for k in range(0, len(chunks), PORTION))
-    return tuple(estimate for portion in portions for estimate in tracker.take(portion))

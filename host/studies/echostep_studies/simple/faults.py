@@ -6,36 +6,30 @@ In: a walk as the filter gets it. Out: the same with other pings. Owns nothing.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from echostep.arrays import Floats
 from echostep.path import MeasuredSegment
-from echostep_studies.bench.echo_changes import LEFT, RIGHT, one_ranger
+from echostep_studies.bench.echo_changes import LEFT, RIGHT, changed, one_ranger
 from echostep_studies.bench.walks import SimulatedWalk
 
 PASSER_M, PASSER_S = 0.5, 3.0  # distance of a body beside the wearer, and for how long
 
 
-def _numbered(walk: SimulatedWalk, change: Callable[[MeasuredSegment, int], MeasuredSegment]) -> SimulatedWalk:
-    """Change each segment, given the number of its first ping."""
-    before, segments = 0, []
-    for s in walk.segments:
-        segments.append(change(s, before))
-        before += len(s.t_s)
-    return replace(walk, segments=tuple(segments))
-
-
 def silent(first: int, count: int, walk: SimulatedWalk) -> SimulatedWalk:
     """The pings from number `first` on hear nothing, `count` of them."""
+    numbers = itertools.count()
 
-    def change(s: MeasuredSegment, before: int) -> MeasuredSegment:
-        number = before + np.arange(len(s.t_s))
-        return replace(s, range_m=np.where((number >= first) & (number < first + count), np.nan, s.range_m))
+    def ranges(s: MeasuredSegment) -> Floats:
+        number = np.array([next(numbers) for _ in s.t_s])
+        return np.where((number >= first) & (number < first + count), np.nan, s.range_m)
 
-    return _numbered(walk, change)
+    return changed(walk, ranges)
 
 
 def silent_in_the_middle(walk: SimulatedWalk) -> SimulatedWalk:
@@ -46,17 +40,14 @@ def silent_in_the_middle(walk: SimulatedWalk) -> SimulatedWalk:
 def passer_by(walk: SimulatedWalk) -> SimulatedWalk:
     """A body answers on the left of the wearer at the start."""
     until_s = walk.segments[0].segment.t0_s + PASSER_S
-
-    def change(s: MeasuredSegment, _before: int) -> MeasuredSegment:
-        beside = (s.ranger == LEFT) & (s.t_s < until_s)
-        return replace(s, range_m=np.where(beside, np.fmin(s.range_m, PASSER_M), s.range_m))
-
-    return _numbered(walk, change)
+    return changed(
+        walk, lambda s: np.where((s.ranger == LEFT) & (s.t_s < until_s), np.fmin(s.range_m, PASSER_M), s.range_m)
+    )
 
 
 def dead_ranger(walk: SimulatedWalk) -> SimulatedWalk:
     """The right ranger hears nothing from the start on."""
-    return _numbered(walk, lambda s, _: replace(s, range_m=np.where(s.ranger == RIGHT, np.nan, s.range_m)))
+    return changed(walk, lambda s: np.where(s.ranger == RIGHT, np.nan, s.range_m))
 
 
 def foot_alone(walk: SimulatedWalk) -> SimulatedWalk:

@@ -9,20 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from functools import partial
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.localization import Start
 from echostep.plan import Pose
 from echostep_app.output.table import Table
 from echostep_studies.bench.filtering import track
 from echostep_studies.bench.judgement import LOST, TRACKING, TruePlaces, judge
-from echostep_studies.bench.walks import SimulatedWalk, T, X, Y, simulate, simulate_by_legs
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.bench.walks import SimulatedWalk, simulate, simulate_by_legs
+from echostep_studies.frame.parts import matching
+from echostep_studies.frame.report import Row, by_name, named
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.simple.buildings import BUILDINGS
 from echostep_studies.simple.faults import FAULTS
@@ -87,7 +86,7 @@ def _row(name: str, seed: int, walk: SimulatedWalk) -> SimpleRow:
         start = Pose(start.x_m + 0.15 * east, start.y_m + 0.15 * north, start.heading_rad + math.radians(5.0) * turn)
     run = track(walk.segments, walk.built, Start(start), seed)
     t_s = np.array([claim.t_s for claim in run.claims])
-    true = np.column_stack([np.interp(t_s, walk.truth[:, T], walk.truth[:, k]) for k in (X, Y)])
+    true = walk.places_at(t_s)
     judged = judge(run.claims, TruePlaces(true, np.ones((len(t_s), 1), np.bool_)), walk.walked_m(t_s))
     off = judged.error_m
     return SimpleRow(
@@ -106,16 +105,12 @@ def _laid(walk: SimulatedWalk, start: Pose) -> Floats:
     return np.asarray(ends @ np.array([[c, s], [-s, c]]) + (start.x_m, start.y_m))
 
 
-def _summaries(rows: Sequence[SimpleRow]) -> list[Row]:
-    return [_summary(group) for group in rows_by_name(rows)]
-
-
 def _summary(rows: Sequence[SimpleRow]) -> Row:
     def mean(name: str, power: float = 1.0) -> float:
         return round(float(np.mean([getattr(row, name) ** power for row in rows]) ** (1.0 / power)), 5)
 
     return {
-        "name": rows[0].name, "runs": len(rows), "tracking": 100.0 * mean("tracking"), "lost": 100.0 * mean("lost"),
+        **named(rows), "tracking": 100.0 * mean("tracking"), "lost": 100.0 * mean("lost"),
         "false_tracking": 100.0 * mean("false_tracking"), "mean_m": mean("mean_m"), "rmse_m": mean("rmse_m", 2.0),
         "worst_m": max(row.worst_m for row in rows), "laid_m": mean("laid_m", 2.0),
     }  # fmt: skip
@@ -123,10 +118,8 @@ def _summary(rows: Sequence[SimpleRow]) -> Row:
 
 def simple_study(pattern: str = "*") -> Study[SimpleRow, Row]:
     """The study of the rows whose names match a pattern."""
-    names = tuple(name for name in NAMES if fnmatch(name, pattern))
-    if not names:
-        raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(NAMES)}")
-    return Study("simple", (SimpleRow,), partial(simple_run, names), _summaries, _tables)
+    names = matching(NAMES, pattern)
+    return Study("simple", (SimpleRow,), partial(simple_run, names), by_name(_summary), _tables)
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:

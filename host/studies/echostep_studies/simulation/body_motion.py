@@ -14,6 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_simulation.people.attitude import rotations, turns
+from echostep_simulation.people.rolling_foot import glide
 
 RATE_HZ = 1000
 G0_M_S2 = 9.80665  # standard gravity
@@ -59,7 +60,7 @@ class BodyMotion:
 
     def turn(self, begin_s: float, seconds: float, pitch_deg: float, roll_deg: float = 0.0) -> None:
         """Turn smoothly by these angles and stay so."""
-        share = _smooth((self.t_s - begin_s) / seconds)
+        share = glide((self.t_s - begin_s) / seconds)
         self.rpy[:, 0] += roll_deg * DEGREE * share
         self.rpy[:, 1] += pitch_deg * DEGREE * share
 
@@ -101,9 +102,3 @@ class BodyMotion:
             noisy = mean + bias * rng.standard_normal(3) + noise * rng.standard_normal(mean.shape)
             measured.append(np.clip(noisy, -most, most))
         return MotionSamples(self.t_s[ends - 1], measured[0], measured[1])
-
-
-def _smooth(u: Floats) -> Floats:
-    u = np.clip(u, 0.0, 1.0)
-    smoothed: Floats = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    return smoothed

@@ -23,6 +23,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_simulation.people.leg_angles import HALF_PELVIS_M, KNEE_DEG, THIGH_DEG, LegDimensions, series
+from echostep_simulation.people.rolling_foot import glide
 
 RATE_HZ = 500
 ANKLE_DEG = (1, -3, -1, 3, 6, 8, 10, 11, 12, 13, 9, -2, -14, -16, -7, -2, 1, 2, 2, 2)  # dorsiflexion
@@ -114,7 +115,7 @@ def simulate_gait(
     phase += rng.choice([0.62, 0.12]) - phase[int(stand_s * RATE_HZ)]
     steps = 2.0 * phase[int((stand_s + walk_s) * RATE_HZ)]
     stop_s = float(np.interp(0.5 * math.ceil(steps), phase, t))
-    moves = _ease((t - stand_s) / (START * stride_s)) * _ease((stop_s - t) / (START * stride_s))
+    moves = glide((t - stand_s) / (START * stride_s)) * glide((stop_s - t) / (START * stride_s))
     right, left = (_angles(person, manner, phase + k, moves, 1.0 if k == 0.0 else person.other) for k in (0.0, 0.5))
     turned = HALF_PELVIS_M * np.sin(math.radians(person.pelvis_deg) * manner.hip * moves * np.cos(2.0 * np.pi * phase))
     moved = (
@@ -132,7 +133,7 @@ def _angles(
     part = phase % 1.0
     thigh_mean = math.radians(sum(THIGH_DEG) / len(THIGH_DEG))
     thigh = thigh_mean + manner.hip * person.hip * amplitude * (series(THIGH_DEG, phase) - thigh_mean)
-    loaded = _ease((LOADED + 0.08 - part) / 0.16) + _ease((part - 0.96) / 0.04)
+    loaded = glide((LOADED + 0.08 - part) / 0.16) + glide((part - 0.96) / 0.04)
     knee = (
         series(KNEE_DEG, phase) * person.knee * (manner.swing + (manner.load - manner.swing) * np.minimum(loaded, 1.0))
     )
@@ -146,7 +147,7 @@ def _angles(
 def _ankle(manner: WalkingPace, phase: Floats) -> Floats:
     """Dorsiflexion (n,), rad, with a push-off that is farther and later by the pace."""
     part = phase % 1.0
-    pushes = _ease((part - PUSHES[0]) / (PUSHES[1] - PUSHES[0])) * _ease((PUSHES[3] - part) / (PUSHES[3] - PUSHES[2]))
+    pushes = glide((part - PUSHES[0]) / (PUSHES[1] - PUSHES[0])) * glide((PUSHES[3] - part) / (PUSHES[3] - PUSHES[2]))
     curve = series(ANKLE_DEG, phase - manner.late * pushes)
     angles: Floats = np.where(curve < 0.0, curve * (1.0 + (manner.push - 1.0) * pushes), curve)
     return angles
@@ -177,10 +178,3 @@ def _carried(phase: Floats) -> Floats:
     """The leg's share of the weight (n,): both legs' shares are 1 together."""
     part = phase % 1.0
     return np.interp(part, [0.0, DOUBLE, 0.5, 0.5 + DOUBLE, 1.0], [0.0, 1.0, 1.0, 0.0, 0.0])
-
-
-def _ease(share: Floats) -> Floats:
-    """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
-    v = np.clip(share, 0.0, 1.0)
-    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return eased

@@ -17,11 +17,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from echostep_studies.speed.among_walls import crossing, growing, weighing
+from echostep_studies.frame.pictures import BLUE, RED, axes_of, save
+from echostep_studies.speed.against_peers import crossing, growing, stepping, weighing
 from echostep_studies.speed.comparison import Row, Scale
 from echostep_studies.speed.peers import MISSING
 from echostep_studies.speed.processes import replaying, starting
-from echostep_studies.speed.steps import stepping
 
 
 def rows(scale: Scale) -> Iterator[Row]:
@@ -32,20 +32,14 @@ def rows(scale: Scale) -> Iterator[Row]:
 
 def picture(rows: list[Row], path: Path) -> None:
     """The ratios as bars, with what is promised."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(9, 0.45 * len(rows) + 1.2), layout="constrained")
-    axes.barh([r.name for r in rows], [r.ratio for r in rows], color="#4477aa")
+    figure, ((axes,),) = axes_of(1, 1, (9, 0.45 * len(rows) + 1.2))
+    axes.barh([r.name for r in rows], [r.ratio for r in rows], color=BLUE)
     for k, row in enumerate(rows):
         if row.wanted is not None:
-            axes.plot([row.wanted, row.wanted], [k - 0.4, k + 0.4], color="#cc3311")
+            axes.plot([row.wanted, row.wanted], [k - 0.4, k + 0.4], color=RED)
     axes.set(xscale="log", xlabel="times longer; red: promised")
     axes.invert_yaxis()
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    save(figure, path)
 
 
 def main() -> None:

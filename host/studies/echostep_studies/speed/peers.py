@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.jit import kernel, part
-from echostep.walls.index import TILE_M, WallIndex, tile_at
+from echostep.walls.index import TILE_M, WallIndex, build_index, tile_at
 
 Reader = Callable[[Floats, Floats, Floats], Floats]  # poses -> what each ranger reads (n, 2)
 
@@ -95,12 +95,18 @@ def shapely_reader(walls: Floats) -> Reader:
     return read
 
 
+def plain_reader(walls: Floats) -> Reader:
+    """Our own reference."""
+    index = build_index(walls)
+    return lambda x, y, heading: plain_rays(x, y, heading, index)
+
+
 @kernel
 def plain_rays(
     x: Floats, y: Floats, heading: Floats, index: WallIndex,
     rays: int = RAYS, aperture_rad: float = APERTURE_RAD, maximum_m: float = MAXIMUM_M,
 ) -> Floats:  # fmt: skip
-    """The same readings by rays that walk through the tiles [Amanatides, Woo 1987]: our own reference."""
+    """The same readings by rays that walk through the tiles [Amanatides, Woo 1987]."""
     out = np.full((len(x), 2), maximum_m)
     least = math.cos(0.5 * aperture_rad / rays)
     for i in range(len(x)):
@@ -217,6 +223,12 @@ def particles_update(count: int) -> Callable[[], object]:
     return lambda: next(filter_)
 
 
+# By name: what makes the reader of a plan's walls, and how many times longer it must take; what makes the update of a filter of so many candidates
+READERS: dict[str, tuple[Callable[[Floats], Reader], float | None]] = {
+    "shapely STRtree": (shapely_reader, 1000.0),
+    "embreex": (embreex_reader, 15.0),
+    "our own plain rays": (plain_reader, None),
+}
 MAPLESS: dict[str, Callable[[int], Callable[[], object]]] = {
     "filterpy": filterpy_update,
     "stonesoup": stonesoup_update,

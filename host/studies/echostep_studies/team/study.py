@@ -13,9 +13,8 @@ those alone: how much of `worst` means nothing. An error on a wrong floor is at 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from functools import partial
 
 import numpy as np
@@ -28,10 +27,10 @@ from echostep_app.output.table import Table
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.world.tower import tower
 from echostep_studies.bench import judgement, sites
-from echostep_studies.bench.judgement import FALSE_TRACKING_M, TruePlaces, true_levels
+from echostep_studies.bench.judgement import FALSE_TRACKING_M, true_places
 from echostep_studies.bench.tours import random_tour
-from echostep_studies.bench.walks import T, X, Y, Z
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.parts import matching
+from echostep_studies.frame.report import Row, by_name, means
 from echostep_studies.frame.study import Study, StudyRequest
 from echostep_studies.team.beacons import with_dropped_beacons
 from echostep_studies.team.tracking import LIAR, How, track_team
@@ -141,35 +140,23 @@ def _row(name: str, walks: TeamWalks, who: int, runs: Sequence[Sequence[Estimate
 
 def errors_m(walks: TeamWalks, who: int, estimates: Sequence[Estimate]) -> Floats:
     """Errors (n,) of a wearer's estimates."""
-    truth = walks.truth[who]
-    t_s = np.array([e.t_s for e in estimates])
-    x, y, z = (np.interp(t_s, truth[:, T], truth[:, k]) for k in (X, Y, Z))
-    place = np.column_stack([x, y])
-    true = TruePlaces(place, true_levels(place, z, walks.plan))
+    true = true_places(walks.truth[who], np.array([e.t_s for e in estimates]), walks.plan)
     places = np.array([(e.x_m, e.y_m) for e in estimates]).reshape(-1, 2)
     return judgement.errors_m(places, np.array([e.level for e in estimates], np.int64), true)
 
 
 def _summary(rows: Sequence[WearerRun]) -> Row:
     """One row of all runs of a name."""
-    first, others = ([r for r in rows if (r.wearer == FIRST) is is_first] for is_first in (True, False))
-    alone_m, together_m = _mean(r.alone_m for r in rows), _mean(r.together_m for r in rows)
-    return {
-        "name": rows[0].name, "runs": len({r.seed for r in rows}), "meetings": round(_mean(r.meetings for r in rows), 4),
-        "alone_m": round(alone_m, 4), "together_m": round(together_m, 4),
-        "first_alone_m": round(_mean(r.alone_m for r in first), 4) if first else None,
-        "first_together_m": round(_mean(r.together_m for r in first), 4) if first else None,
-        "others_alone_m": round(_mean(r.alone_m for r in others), 4),
-        "others_together_m": round(_mean(r.together_m for r in others), 4), "ratio": round(together_m / alone_m, 4),
-        "worst": round(max(r.together_m / r.alone_m for r in others), 4),
-        "by_chance": round(max(r.again_m / r.alone_m for r in others), 4),
-        "false_alone": round(_mean(r.false_alone for r in rows), 4),
-        "false_together": round(_mean(r.false_together for r in rows), 4),
+    parts = {"first": [r for r in rows if r.wearer == FIRST], "others": [r for r in rows if r.wearer != FIRST]}
+    mean = means(rows, ("meetings", "alone_m", "together_m", "false_alone", "false_together"))
+    for part, wearers in parts.items():
+        mean |= {f"{part}_{key}": value for key, value in means(wearers, ("alone_m", "together_m")).items()}
+    ratios = {
+        "ratio": mean["together_m"] / mean["alone_m"], "worst": max(r.together_m / r.alone_m for r in parts["others"]),
+        "by_chance": max(r.again_m / r.alone_m for r in parts["others"]),
     }  # fmt: skip
-
-
-def _mean(values: Iterable[float]) -> float:
-    return float(np.mean(list(values)))
+    rounded = {key: round(value, 4) for key, value in (mean | ratios).items()}
+    return {"name": rows[0].name, "runs": len({r.seed for r in rows}), **rounded}
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
@@ -188,13 +175,5 @@ def _met(row: Row) -> str:
 
 def team_study(rows: str = "*", length_m: float = LENGTH_M) -> Study[WearerRun, Row]:
     """The study of the rows whose names match a pattern."""
-    names = tuple(name for name in ROWS if fnmatch(name, rows))
-    if not names:
-        raise EchostepError(f"--rows {rows}: no row is named so; there are: {', '.join(ROWS)}")
-    return Study(
-        "team",
-        (WearerRun,),
-        partial(one_run, names, length_m),
-        lambda rows: [_summary(group) for group in rows_by_name(rows)],
-        _tables,
-    )
+    names = matching(ROWS, rows)
+    return Study("team", (WearerRun,), partial(one_run, names, length_m), by_name(_summary), _tables)

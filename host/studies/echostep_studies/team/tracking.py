@@ -25,11 +25,10 @@ from echostep_app.session.team.teammate_feed import meeting_with
 from echostep_app.team.outbox import aged
 from echostep_app.team.publish import position_of
 from echostep_simulation.scenario import START_NS
-from echostep_studies.bench.walks import T
+from echostep_studies.bench.walks import PORTION, T
 from echostep_studies.team.walks import Encounter, TeamWalks
 
 TAP_S = 1.0  # from the encounter to the tap, at most; assumed
-PORTION = 1000  # chunks that a tracker gets at once
 # Of a range by ultra-wideband radio between two bodies: it is hardly ever short
 RADIO_SD_M, RADIO_BIAS_M = (0.15, 0.1)
 LIAR = 0  # number of the wearer whose reports are false

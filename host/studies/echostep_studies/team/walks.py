@@ -23,10 +23,9 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint
 from echostep_simulation.scenario import Scenario
 from echostep_studies.bench.tours import random_tour
-from echostep_studies.bench.walks import T, X, Y, Z
+from echostep_studies.bench.walks import CORNER_M, T, X, Y, Z
 
 WEARERS = 5
-CORNER_M = 0.3  # corners are cut by so much, so that the way stays clear of door jambs
 STOP_S = 4.0  # at each place of a tour: a room is looked at
 SIDE_M = 1.2  # between two wearers at a tap, at most: side by side
 RING_M = 0.5  # radius of the ring in which a team stands at a door

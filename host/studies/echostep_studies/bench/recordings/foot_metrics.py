@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from echostep.arrays import Bools, Floats, spans
+from echostep.arrays import Bools, Floats, Ints, spans
 from echostep.foot.steps import Track
+from echostep_simulation.people.walker import Walk
+from echostep_studies.frame.truth import at_times
 
 FROZEN_SAMPLES = 5  # motion capture that repeats itself for longer has lost its markers
 # Footprints of hallway 31 before two strides that contradict every inertial track by 0.3 and 0.6 m in length
@@ -44,7 +46,13 @@ def rmse(track: Floats, truth: Floats) -> float:
 def places(track: Track, t_s: Floats) -> Floats:
     """Horizontal positions (m, 2) at the times t_s (m,), straight in between samples."""
     later = np.concatenate([[True], np.diff(np.maximum.accumulate(track.t_s)) > 0.0])
-    return np.column_stack([np.interp(t_s, track.t_s[later], track.position_m[later, k]) for k in (0, 1)])
+    return at_times(t_s, track.t_s[later], track.position_m[later, :2])
+
+
+def from_true_start(track: Track, walked: Walk, at: Ints) -> Floats:
+    """Places (k, 2) on the map of the samples `at` (k,) of a track that begins at the true first place and heading of a simulated foot."""
+    c, s = np.cos(walked.foot_rpy_rad[0, 2]), np.sin(walked.foot_rpy_rad[0, 2])
+    return np.asarray(track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2])
 
 
 def way(track: Track) -> float:

@@ -28,6 +28,7 @@ from echostep_simulation.stimulus import BoardSensors
 from echostep_studies.bench.recordings.feet import FootRecording, hallway
 from echostep_studies.bench.sites import plan_of
 from echostep_studies.bench.walks import SimulatedWalk, walk_of
+from echostep_studies.frame.truth import at_times
 
 FILES = "gx5_gcp/*_LLIO.mat"
 SETTINGS = "[mtx]\nrate_hz = 200\n\n[gait]\nfoot_left_m = 0.0\n"
@@ -99,7 +100,7 @@ def _mounting(recording: FootRecording) -> Floats:
 def true_walk(walk: Hallway) -> Walk:
     """The true trunk at 1 kHz: above each surveyed footprint at its time, linear in between; the board starts START_S earlier."""
     t = np.arange(int((walk.t_s[-1] + START_S) * RATE_HZ)) / RATE_HZ
-    trunk = np.column_stack([np.interp(t - START_S, walk.print_t_s, walk.print_m[:, k]) for k in (0, 1)])
+    trunk = at_times(t - START_S, walk.print_t_s, walk.print_m)
     strides = np.diff(walk.print_m, axis=0)
     middle = 0.5 * (walk.print_t_s[1:] + walk.print_t_s[:-1])
     heading = np.interp(t - START_S, middle, np.unwrap(np.arctan2(strides[:, 1], strides[:, 0])))

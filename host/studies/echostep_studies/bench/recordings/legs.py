@@ -8,7 +8,7 @@ so that sway to and fro is no way.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,16 +62,17 @@ class LegRecording:
         return float(self.way_s[begin]) - MARGIN_S, float(self.way_s[min(end, last)]) + MARGIN_S
 
 
-def _qmt(path: Path) -> Iterator[LegRecording]:
-    """One person, both legs, feet and lower back, 100 s [Laidig 2023]; the truth is the feet's inertial tracks."""
+def qmt_sensors(path: Path) -> tuple[Floats, Callable[[str, str], Floats]]:
+    """Times (n,) of a file of qmt, and what gives the samples (n, 3) of a part and a sensor [Laidig 2023]."""
     from scipy.io import loadmat
 
     mat: dict[str, Any] = loadmat(path)
-    t_s = mat["t"].ravel()
+    return mat["t"].ravel(), lambda part, name: np.asarray(mat[part][name][0, 0], np.float64)
 
-    def sensor(part: str, name: str) -> Floats:
-        return np.asarray(mat[part][name][0, 0], np.float64)
 
+def _qmt(path: Path) -> Iterator[LegRecording]:
+    """One person, both legs, feet and lower back, 100 s [Laidig 2023]; the truth is the feet's inertial tracks."""
+    t_s, sensor = qmt_sensors(path)
     feet = [walk_track(t_s, sensor(f"foot_{k}", "acc"), sensor(f"foot_{k}", "gyr")) for k in ("left", "right")]
     way_s = np.arange(t_s[0], t_s[-1], 1.0 / WAY_HZ)
     ways = [

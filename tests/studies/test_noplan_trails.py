@@ -18,9 +18,9 @@ from echostep_simulation.devices.mtx import MtxModel, measure
 from echostep_simulation.devices.onboard_filter import OnBoardFilter
 from echostep_simulation.people.walker import Walk
 from echostep_simulation.world.magnetic_field import EARTH_T, MagneticDipole, MagneticField, dipole
+from echostep_studies.noplan.trails import METHODS, RATES_HZ, JudgedTrack, TrailRun, judge, summarize, track
 from echostep_studies.papers import fischer2008
 from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
-from echostep_studies.trails.study import METHODS, RATES_HZ, JudgedTrack, TrailRun, judge, summaries, track
 
 BY_NAME = {trail.name: trail for trail in TRAILS}
 SEEDS = (1, 2, 3)
@@ -187,14 +187,14 @@ def test_the_figures_have_the_printed_magnitudes() -> None:
 @pytest.mark.long
 def test_the_command_writes_rows_for_every_trail_method_and_rate(tmp_path: Path) -> None:
     options = ["--runs", "1", "--seed", "4", "--out", str(tmp_path), "--json", str(tmp_path / "r.json")]
-    found = CliRunner().invoke(app, ["evaluate", "trails", *options])
+    found = CliRunner().invoke(app, ["evaluate", "noplan", "--rows", "trail/*", *options])
     assert found.exit_code == 0, found.output
     results = json.loads((tmp_path / "r.json").read_text())
-    assert (results["study"], results["runs"], results["seed"]) == ("trails", 1, 4)
+    assert (results["study"], results["runs"], results["seed"]) == ("noplan", 1, 4)
     rows = {row["name"]: row for row in results["rows"]}
     assert len(rows) == len(TRAILS) * len(METHODS) * len(RATES_HZ)
-    assert rows["line/fischer2008"]["printed_distance_error_percent"] == 2.0
-    assert rows["l/default/50Hz"]["rate_hz"] == 50
+    assert rows["trail/line/fischer2008"]["printed_distance_error_percent"] == 2.0
+    assert rows["trail/l/default/50Hz"]["rate_hz"] == 50
     for row in rows.values():
         assert row["min_m"] <= row["mean_m"] <= row["max_m"]
         assert row["coverage95"] is None
@@ -203,10 +203,10 @@ def test_the_command_writes_rows_for_every_trail_method_and_rate(tmp_path: Path)
 
 def test_a_summary_is_over_all_runs() -> None:
     row = TrailRun(
-        name="line/default", profile="default", rate_hz=100, distance_m=88.0, distance_error_percent=1.0,
+        name="trail/line/default", profile="default", rate_hz=100, distance_m=88.0, distance_error_percent=1.0,
         heading_error_deg=2.0, heading_max_deg=5.0, errors_m=[0.0, 1.0],
     )  # fmt: skip
     other = replace(row, distance_error_percent=-3.0, heading_max_deg=9.0, errors_m=[1.0, 4.0])
-    (found,) = summaries([row, other])
+    found = summarize([row, other])
     assert (found["distance_error_percent"], found["heading_max_deg"], found["ending_m"]) == (-1.0, 9.0, 2.5)
     assert (found["distance_error_min_percent"], found["lost"], found["runs"]) == (-3.0, 1, 2)

@@ -140,7 +140,8 @@ def _read(received: bytes) -> MeasuredWalk:
     heading = np.full(len(t_s), np.nan)
     good = compass["bearing"] < 3600
     place = np.minimum(np.searchsorted(t_s, at[good]), len(t_s) - 1)
-    heading[place] = _wrapped(0.5 * math.pi - np.radians(0.1 * compass["bearing"][good]))
+    angle = 0.5 * math.pi - np.radians(0.1 * compass["bearing"][good])
+    heading[place] = np.arctan2(np.sin(angle), np.cos(angle))
     thigh, calf, belt = (
         np.where(gyros[name] == m.GYROS_INVALID, np.nan, gyros[name] * ADIS16100_RAD_S)
         for name in ("thigh", "calf", "belt")
@@ -159,7 +160,7 @@ def _timed(frames: Frames, kind: type[m.Message]) -> tuple[Floats, NDArray[np.vo
     _, rows = frames.rows(kind)
     ticks = rows["ticks"].astype(np.int64)
     n, none = len(ticks), np.empty(0, np.int64)
-    arrived = ticks * 500 + 1_000_000_000
+    arrived = ticks * 500 + START_NS
     board = Arrivals(ticks, np.arange(n), arrived, np.full(n, PLAIN))
     times = Timeline(MtxTiming()).times(board, Arrivals(none, none, none, none))
     return times.board_s, rows
@@ -169,8 +170,3 @@ def start_of(walked: Walk) -> tuple[float, float, float]:
     """Place and heading at the beginning."""
     x, y = walked.trunk_m[0].tolist()
     return x, y, float(walked.heading_rad[0])
-
-
-def _wrapped(angle_rad: Floats) -> Floats:
-    """The same angles in [-pi, pi], computed as atan2 of sine and cosine."""
-    return np.arctan2(np.sin(angle_rad), np.cos(angle_rad))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`echostep evaluate trails`: the trails of [Fischer 2008, section 3.2], walked in simulation, by the paper's method and by ours.
+"""The rows `trail/...`: the trails of [Fischer 2008, section 3.2], walked in simulation without a plan, by the paper's method and by ours.
 
 In: seeds. Out: rows for each trail, method and rate. Owns nothing. All results are simulated. The magnitudes of the
 paper's errors were used to set the model of the MTx's filter (`xsens.onboard_filter`) and the machines, so they test the method, not the MTx.
@@ -9,8 +9,9 @@ A track begins at the true first position and heading of the foot; nothing else 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from echostep.foot.steps import Track, walk_track
 from echostep_app.output.table import Table
 from echostep_simulation.devices.mtx import MtxSamples
 from echostep_simulation.people.walker import RATE_HZ, Walk
-from echostep_studies.frame.report import Row, as_dict, rows_by_name, summary
-from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.bench.recordings.foot_metrics import from_true_start
+from echostep_studies.frame.parts import Part
+from echostep_studies.frame.report import Row, as_dict, means, summary
+from echostep_studies.frame.study import StudyRequest
 from echostep_studies.papers import fischer2008
-from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_trail, walk_trail
+from echostep_studies.simulation.fischer_trails import TRAILS, measure_trail, walk_trail
 
 RATES_HZ = (100, 50)  # of the MTx
 METHODS = ("fischer2008", "default")
@@ -52,8 +55,7 @@ def judge(track: Track, walked: Walk) -> JudgedTrack:
     leaves = np.append(leaves, int(track.t_s[-1] * RATE_HZ))
     at = np.minimum(np.searchsorted(track.t_s, leaves / RATE_HZ), len(track.t_s) - 1)
     yaw = walked.foot_rpy_rad[:, 2]
-    c, s = math.cos(yaw[0]), math.sin(yaw[0])
-    places = track.position_m[at, :2] @ np.array([[c, s], [-s, c]]) + walked.foot_m[0, :2]
+    places = from_true_start(track, walked, at)
     true = walked.foot_m[leaves, :2]
     turned = track.heading_rad[at] - (yaw[leaves] - yaw[0])
     return JudgedTrack(
@@ -102,21 +104,28 @@ class PrintedRun(TrailRun):
     printed_distance_error_percent: float | None
 
 
-def one_run(seed: int) -> list[TrailRun]:
-    """Rows of one run: every trail, rate and method."""
+NAMES = {
+    f"trail/{trail.name}/{profile}" + ("" if rate_hz == RATES_HZ[0] else f"/{rate_hz}Hz"): (trail, profile, rate_hz)
+    for trail in TRAILS for rate_hz in RATES_HZ for profile in METHODS
+}  # fmt: skip
+
+
+def trail_rows(names: Sequence[str], seed: int) -> list[TrailRun]:
+    """The rows of these names for one person; a trail is walked once, and measured once at each rate."""
+    walks = cache(partial(walk_trail, seed=seed))
+    measured = cache(lambda trail, rate_hz: measure_trail(trail, walks(trail), rate_hz, seed))
     rows = []
-    for trail in TRAILS:
-        walked = walk_trail(trail, seed)
-        for rate_hz in RATES_HZ:
-            samples = measure_trail(trail, walked, rate_hz, seed)
-            rows += [_row(trail, rate_hz, profile, judge(track(samples, profile), walked)) for profile in METHODS]
+    for name in names:
+        trail, profile, rate_hz = NAMES[name]
+        rows.append(_row(name, judge(track(measured(trail, rate_hz), profile), walks(trail))))
     return rows
 
 
-def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> TrailRun:
+def _row(name: str, walked: JudgedTrack) -> TrailRun:
+    trail, profile, rate_hz = NAMES[name]
     degrees = np.degrees(walked.heading_errors_rad)
     row = TrailRun(
-        name=f"{trail.name}/{profile}" + ("" if rate_hz == RATES_HZ[0] else f"/{rate_hz}Hz"),
+        name=name,
         profile=profile,
         rate_hz=rate_hz,
         distance_m=walked.distance_m,
@@ -130,20 +139,14 @@ def _row(trail: Trail, rate_hz: int, profile: str, walked: JudgedTrack) -> Trail
     return PrintedRun(**as_dict(row), printed=trail.printed, printed_distance_error_percent=trail.printed_percent)
 
 
-def summaries(rows: Sequence[TrailRun]) -> list[Row]:
-    """One row for each trail, method and rate, over all runs."""
-    return [_summary(group) for group in rows_by_name(rows)]
-
-
-def _summary(rows: list[TrailRun]) -> Row:
+def summarize(rows: Sequence[TrailRun]) -> Row:
+    """The summary row of one trail, method and rate, over all runs."""
     first = rows[0]
     off = [row.distance_error_percent for row in rows]
     common: Row = {
         **summary(first.name, first.profile, [row.errors_m for row in rows], []), "rate_hz": first.rate_hz,
-        "distance_m": round(sum(row.distance_m for row in rows) / len(rows), 2),
-        "distance_error_percent": round(sum(off) / len(off), 2), "distance_error_min_percent": round(min(off), 2),
-        "distance_error_max_percent": round(max(off), 2),
-        "heading_error_deg": round(sum(row.heading_error_deg for row in rows) / len(rows), 2),
+        **means(rows, ("distance_m", "distance_error_percent", "heading_error_deg"), 2),
+        "distance_error_min_percent": round(min(off), 2), "distance_error_max_percent": round(max(off), 2),
         "heading_max_deg": round(max(row.heading_max_deg for row in rows), 2),
     }  # fmt: skip
     if not isinstance(first, PrintedRun):
@@ -153,26 +156,23 @@ def _summary(rows: list[TrailRun]) -> Row:
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
     """One table for each rate; below the last one the printed and simulated errors of the way."""
+    ours = [row for row in rows if "rate_hz" in row]
     tables = []
     for rate_hz in RATES_HZ:
-        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in rows if row["rate_hz"] == rate_hz]
-        notes = (
-            ("Printed and simulated error of the way: " + "; ".join(_ranges(rows)), LEGEND)
-            if rate_hz == RATES_HZ[-1]
-            else ()
-        )
+        shown = [row | {"name": row["name"].removesuffix(f"/{rate_hz}Hz")} for row in ours if row["rate_hz"] == rate_hz]
         title = f"Trails of Fischer et al. 2008, simulated: {request.runs} runs at {rate_hz} Hz"
-        tables.append(Table(title, shown, COLUMNS, notes))
+        tables.append(Table(title, shown, COLUMNS, (*_ranges(shown), LEGEND)))
     return tables
 
 
-def _ranges(rows: list[Row]) -> list[str]:
+def _ranges(rows: Iterable[Row]) -> list[str]:
     """The printed distance errors, each with the range of the simulated walkers."""
-    return [
+    known = [row for row in rows if row.get("printed_distance_error_percent") is not None]
+    ranges = "; ".join(
         "{name} {printed}, {distance_error_min_percent:+.1f} to {distance_error_max_percent:+.1f} %".format(**row)
-        for row in rows
-        if row.get("printed_distance_error_percent") is not None
-    ]
+        for row in known
+    )
+    return [f"Printed and simulated error of the way: {ranges}"] if known else []
 
 
-STUDY = Study("trails", (TrailRun, PrintedRun), one_run, summaries, _tables, parquet=None)
+PART = Part(list(NAMES), trail_rows, {TrailRun: summarize, PrintedRun: summarize}, _tables)

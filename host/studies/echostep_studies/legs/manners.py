@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Legs in manners of moving that two gyros in the plane of the leg do not show, or only in part.
+"""The rows `legs/upstairs`, ...: manners of moving that two gyros in the plane of the leg do not show, or only in part.
 
 In: seeds. Out: a row a manner: true and estimated way forward and up, the error over its stated deviation, the strides' flags. Owns the
 manners: curves of thigh and knee, assumed where `leg_angles` has none. The signs of the gyros are known, as from a walk before.
@@ -8,17 +8,21 @@ manners: curves of thigh and knee, assumed where `leg_angles` has none. The sign
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.legs.kinematics import LegLengths
-from echostep.legs.stride import Flag, Stride, StrideSettings
-from echostep.legs.strides import StrideEstimator
+from echostep.legs.stride import Flag, Stride
 from echostep_app.offline.leg_side import distance_sd_m
+from echostep_app.output.table import Table
 from echostep_simulation.people.leg_angles import LegDimensions, stair_angles
+from echostep_simulation.people.rolling_foot import glide
+from echostep_studies.frame.parts import Part
+from echostep_studies.frame.report import Row, means, named
+from echostep_studies.frame.study import StudyRequest
+from echostep_studies.legs.people import strides_of
 
 CYCLES, RATE_HZ, STAND_S, EASE_S = 15, 100.0, 2.0, 0.8
 AMPLITUDE_SD, TIME_SD = 0.08, 0.05  # of a person against the curves
@@ -26,6 +30,11 @@ BIAS_RAD_S, NOISE_RAD_S = 0.02, 0.01  # sd
 SWING = (0.60, 1.0)  # phases of a leg in the air
 STAIRS = Flag.STAIRS_UP | Flag.STAIRS_DOWN
 BLIND = Flag.UNSEEN | Flag.BACKWARD | Flag.STANDING
+FIGURES = ("forward_m", "found_m", "sd_m", "error_over_sd", "up_m", "rise_m", "stairs_percent", "blind_percent")
+COLUMNS = {
+    "name": "", "forward_m": "forward m", "found_m": "found m", "sd_m": "sd m", "error_over_sd": "error / sd", "up_m": "up m", "rise_m": "rise m",
+    "stairs_percent": "stairs %", "blind_percent": "unseen %",
+}  # fmt: skip
 
 Angles = Callable[[Floats], tuple[Floats, Floats]]
 
@@ -71,7 +80,7 @@ MANNERS = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LegRun:
+class MannerRun:
     """One manner of moving, measured by a leg: true and estimated way forward and upward, and the flags of the strides."""
 
     name: str
@@ -86,20 +95,19 @@ class LegRun:
     blind_percent: float
 
 
-def leg_rows(seed: int) -> list[LegRun]:
-    """One row for each manner."""
-    return [leg_row(name, manner, seed) for name, manner in MANNERS.items()]
+def manner_rows(names: Sequence[str], seed: int) -> list[MannerRun]:
+    """CYCLES of each of these manners by one person, from standing to standing."""
+    return [_row(name, MANNERS[name.removeprefix("legs/")], seed) for name in names]
 
 
-def leg_row(name: str, manner: LegManner, seed: int) -> LegRun:
-    """CYCLES of one manner by one person, from standing to standing."""
+def _row(name: str, manner: LegManner, seed: int) -> MannerRun:
     rng = np.random.default_rng([seed, 71])
     strides = _strides(manner, rng)
     moved = [s for s in strides if Flag.STANDING not in s.flags]
     forward = CYCLES * manner.forward_m
     measured_m, sd = sum(s.length_m for s in strides), distance_sd_m(strides)
-    return LegRun(
-        name=f"legs/{name}", seed=seed, forward_m=forward, found_m=measured_m, sd_m=sd,
+    return MannerRun(
+        name=name, seed=seed, forward_m=forward, found_m=measured_m, sd_m=sd,
         error_over_sd=(measured_m - forward) / sd if sd > 0.0 else math.nan,
         up_m=CYCLES * manner.up_m, rise_m=sum(s.rise_m for s in strides),
         stairs_percent=_share(moved, STAIRS), blind_percent=_share(moved, BLIND),
@@ -113,15 +121,14 @@ def _strides(manner: LegManner, rng: np.random.Generator) -> list[Stride]:
     posture_s = EASE_S if any(manner.posture_rad) else 0.0
     t_s = np.arange(0.0, walk_s + 2.0 * (STAND_S + posture_s + EASE_S), 1.0 / RATE_HZ)
     begin = STAND_S + posture_s
-    moves = _ease((t_s - begin) / EASE_S) * _ease((begin + walk_s - t_s) / EASE_S)
-    down = _ease((t_s - STAND_S) / EASE_S) * _ease((begin + walk_s + EASE_S - t_s) / EASE_S) if posture_s else 0.0 * t_s
+    moves = glide((t_s - begin) / EASE_S) * glide((begin + walk_s - t_s) / EASE_S)
+    down = glide((t_s - STAND_S) / EASE_S) * glide((begin + walk_s + EASE_S - t_s) / EASE_S) if posture_s else 0.0 * t_s
     curves = manner.angles((t_s - begin) / (manner.cycle_s * time))
     rates = []
     for curve, posture in zip(curves, manner.posture_rad, strict=True):
         rate = np.gradient(posture * down + amplitude * moves * curve) * RATE_HZ
         rates.append(rate + BIAS_RAD_S * rng.standard_normal() + NOISE_RAD_S * rng.standard_normal(len(t_s)))
-    legs = StrideEstimator(StrideSettings(LegLengths(LegDimensions().thigh_m, LegDimensions().shank_m)), (1.0, 1.0))
-    return [*legs.feed(t_s, rates[0], rates[1]), *legs.finish()]
+    return strides_of(LegDimensions(), t_s, rates[0], rates[1], (1.0, 1.0))
 
 
 def _share(strides: list[Stride], flags: Flag) -> float:
@@ -129,8 +136,14 @@ def _share(strides: list[Stride], flags: Flag) -> float:
     return 100.0 * sum(bool(s.flags & flags) for s in strides) / len(strides) if strides else 0.0
 
 
-def _ease(share: Floats) -> Floats:
-    """From 0 to 1 with the least jerk [Flash and Hogan 1985]."""
-    v = np.clip(share, 0.0, 1.0)
-    eased: Floats = v**3 * (10.0 - 15.0 * v + 6.0 * v**2)
-    return eased
+def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
+    title = f"One leg alone, {CYCLES} cycles, {request.runs} runs, simulated"
+    return [Table(title, [row for row in rows if "rise_m" in row], COLUMNS)]
+
+
+PART = Part(
+    [f"legs/{name}" for name in MANNERS],
+    manner_rows,
+    {MannerRun: lambda group: named(group) | means(group, FIGURES)},
+    _tables,
+)

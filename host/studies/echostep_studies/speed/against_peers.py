@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Speed among walls: clouds weighed, moves that cross walls, plans of a city's size.
+"""Speed beside peers: clouds weighed, moves that cross walls, plans of a city's size, and the whole step of [Girard 2011].
 
-In: a `Scale`. Out: `Row`s. Owns nothing. Ours and the peer's see the same poses and walls; their weights must agree.
+In: a `Scale`. Out: `Row`s. Owns nothing. Ours and the peer's see the same poses and walls, and their weights must agree; only the updates of other
+filters have no map.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from statistics import median
+from unittest import mock
 
 import numpy as np
 import shapely
@@ -23,17 +25,18 @@ from echostep.jit import kernel
 from echostep.plan import load_plan
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex, build_index, crosses_wall
+from echostep_studies.papers import girard2011
 from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 from echostep_studies.speed.comparison import Row, Scale, Work, compared
 from echostep_studies.speed.peers import (
     APERTURE_RAD,
+    MAPLESS,
     MAXIMUM_M,
     MISSING,
     RAYS,
+    READERS,
     Reader,
-    embreex_reader,
     plain_rays,
-    shapely_reader,
 )
 
 
@@ -97,12 +100,10 @@ def weighing(scale: Scale) -> Iterator[Row]:
 
     ours = partial(our_reading, owner, x, y, heading)
     expected = ours()
-    readers: dict[str, tuple[Reader, float | None]] = {"shapely STRtree": (shapely_reader(walls), 1000.0)}
-    if "embreex" not in MISSING:
-        readers["embreex"] = (embreex_reader(walls), 35.0)
-    index = build_index(walls)
-    readers["our own plain rays"] = (lambda a, b, c: plain_rays(a, b, c, index), None)
-    for peer, (read, wanted) in readers.items():
+    for peer, (reader, wanted) in READERS.items():
+        if peer in MISSING:
+            continue
+        read = reader(walls)
         agree = np.isclose(weights(read(x, y, heading)), expected, atol=1e-5).mean()
         if agree < 0.999:
             raise SystemExit(f"{peer}: only {agree:.2%} of the weights agree with ours")
@@ -173,3 +174,41 @@ def _json_s(path: Path) -> float:
     began = time.perf_counter()
     json.loads(path.read_bytes())
     return time.perf_counter() - began
+
+
+def stepping(scale: Scale) -> Iterator[Row]:
+    """The whole step of [Girard 2011] with its map, against other filters' updates without one, and against itself with rays."""
+    walls = offices(scale.office)
+    x, y, _ = cloud(walls, 1)
+
+    def stepper(candidates: int) -> Work:
+        settings = girard2011.GirardSettings(nu=max(candidates // 20, 1))
+        filter_ = girard2011.Girard(
+            settings, (float(x[0]), 12.5 * (y[0] // 12.5) + 6.25), walls, np.random.default_rng(1)
+        )
+        ahead = [1.0]
+
+        def step() -> object:
+            ahead[0] = -ahead[0]
+            return filter_.step(1.25 * ahead[0], 0.0, 0.0, (1.2, 1.3))
+
+        for _ in range(6):
+            step()
+        return step
+
+    for name, update in MAPLESS.items():
+        if name not in MISSING:
+            yield compared(
+                f"step of {scale.candidates:,} candidates; update of {name}, no map",
+                stepper(scale.candidates),
+                update(scale.candidates),
+                scale.rounds,
+                2.0,
+            )
+    step = stepper(3000)
+
+    def with_rays() -> object:
+        with mock.patch("echostep_studies.papers.girard2011.lambda_ray_ranges", plain_rays):
+            return step()
+
+    yield compared("step at nu = 150; the same by our own plain rays", step, with_rays, scale.rounds, 10.0)
