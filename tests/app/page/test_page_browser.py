@@ -140,7 +140,9 @@ def test_a_quick_stroke_does_not_swallow_the_next_tap(browser: Any) -> None:
         finger, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
         for k in range(4):
             place = {"x": box["x"] + 80 + 60 * k, "y": box["y"] + 160}
-            finger.send("Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": [place]})
+            finger.send(
+                "Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": [place]}
+            )
         finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
         before = page.evaluate("echostep.view.scale")
         page.tap("#closer")

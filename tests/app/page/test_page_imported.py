@@ -65,7 +65,6 @@ def test_every_floor_of_an_imported_plan_is_on_the_page(browser: Any, kind: str,
         page = looking(browser, server.url, "bright")
         wait_for(page, "echostep.scene.level === 1")
         wait_for(page, "document.querySelector('#walls path') !== null")
-        page.screenshot(path=tmp_path / f"page-{kind}.png")
         assert plan.levels[1].name in page.text_content("#place")
         for k, level in enumerate(plan.levels):
             page.evaluate(f"document.querySelectorAll('#floors button')[{k}].click()")

@@ -202,7 +202,7 @@ def test_keys_alone_draw_name_and_delete(browser: Any, drawn: EditServer) -> Non
 
 
 @pytest.mark.parametrize("held", PHONES)
-def test_fingers_on_a_phone_held_either_way(browser: Any, house: EditServer, held: str, tmp_path: Path) -> None:
+def test_fingers_on_a_phone_held_either_way(browser: Any, house: EditServer, held: str) -> None:
     page = on_phone(browser, house, held)
     page.tap("#add")
     for place in ((2.5, 2.0), (3.0, 2.5)):
@@ -220,7 +220,6 @@ def test_fingers_on_a_phone_held_either_way(browser: Any, house: EditServer, hel
         touch("touchMove", *place)
     touch("touchEnd")
     says(page, "Selected: 3")
-    page.screenshot(path=tmp_path / f"selected-{held}.png")
     found = violations(page)
     assert (found, overflow(page)) == ([], (0, 0))
     page.tap("#delete")
@@ -285,13 +284,12 @@ def test_geometry(browser: Any, drawn: EditServer) -> None:
 
 
 @pytest.mark.parametrize("look", ["bright", "dark", "contrast"])
-def test_nothing_keeps_anybody_out(browser: Any, served: EditServer, look: str, tmp_path: Path) -> None:
+def test_nothing_keeps_anybody_out(browser: Any, served: EditServer, look: str) -> None:
     phone = {"viewport": {"width": 360, "height": 640}, "has_touch": True, "is_mobile": True}
     page = opened(browser, served, **({} if look == "dark" else phone))
     page.select_option("#look", look)
     drag(page, (0.0, 0.0), (26.0, 14.0))
     found = violations(page)
-    page.screenshot(path=tmp_path / f"edit-{look}.png")
     assert not page.wrong
     assert found == []
     assert overflow(page) == (0, 0)

@@ -101,7 +101,6 @@ def test_a_recording_of_another_building_waits_for_its_plan(
     with dropping(monkeypatch) as url, loaded_page(browser, url, DESK, WAITS) as page:
         drop(page, walk)
         wait_for(page, f"{SAID} === 'walk.mcap: now drop its plan (Other building).'")
-        page.screenshot(path=tmp_path / "drop.png")
         page.set_input_files("#drop-file", plan)  # by the button
         wait_for(page, f"{HINT} === 'Note: Other building is not the plan that walk.mcap was tracked on.'")
         wait_for(page, PLAYS.format("walk.mcap (simulated): Other building"))

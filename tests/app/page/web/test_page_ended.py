@@ -30,7 +30,7 @@ SIZES = {"desk": {"width": 1280, "height": 720}, "phone": {"width": 360, "height
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp_path: Path, size: str) -> None:
+def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, size: str) -> None:
     t_s = np.arange(0.0, 20.0, 0.1)
     tracker, chunks = Tracker(PLAN, seed=1), walk_chunks()
     with LivePage(tracker, "echostep demo (simulated, 4 x real time)", LOCAL, keeps=True) as live:
@@ -47,7 +47,6 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         live.mailbox.end("mean error 0.06 m, at most 0.16 m")
         wait_for(page, f"{SAYS} === '{ENDED}'")
         wait_for(page, f"!document.getElementById('replay').hidden && {SETTLED} && {FITS}")  # beside the time bar
-        page.screenshot(path=tmp_path / f"ended-{size}.png")
         assert page.get_attribute("#words", "data-status") == "ended"
         green = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--good')")
         assert page.evaluate("getComputedStyle(document.getElementById('mark')).color") != rgb(green)
@@ -101,7 +100,6 @@ def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
     assert page.inner_text("#fault") == said
     page.evaluate("echostep.link.wait = 50")
     wait_for(page, "echostep.link.failures > 4")  # the server is away; that it does not answer is no other error
-    page.screenshot(path=tmp_path / f"failed-{size}.png")
     assert page.inner_text("#fault") == said
 
 

@@ -1,32 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""A newcomer and a responder each visit the wearer's page in Chromium, in five windows at once, on the demo's plan and on seven floors."""
+"""A newcomer and a responder each visit the wearer's page in Chromium, in four windows at once, on the demo's plan and on seven floors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from echostep.plan import Plan
 from page.browser import HELD_MS, READY, loaded_page, overflow, violations, wait_for
+from page.web.test_page_sizes import SIZES
 from page.web.test_page_visit import PLACES, Visit
 from waiting import until
 
-SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256), (1920, 1080))
 Look = Callable[[str], None]
 
 
 @contextmanager
-def windows(browser: Any, url: str, tmp_path: Path) -> Iterator[tuple[list[Any], Look]]:
+def windows(browser: Any, url: str) -> Iterator[tuple[list[Any], Look]]:
     """A page of each size, and `look`, which checks all of them by axe and takes their pictures; what goes wrong on them fails the test."""
     pages = [loaded_page(browser, url, {"viewport": {"width": w, "height": h}}, READY) for w, h in SIZES]
 
     def look(moment: str) -> None:
         for (width, _), page in zip(SIZES, pages, strict=True):
-            page.screenshot(path=tmp_path / f"{width}-{moment}.png")
             found = violations(page)
             assert found == [], f"{width}, {moment}"
             assert overflow(page) == (0, 0), f"{width}, {moment}"
@@ -47,13 +45,13 @@ def legend(page: Any) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PLACES)
-def test_a_newcomer_looks_around(browser: Any, name: str, tmp_path: Path) -> None:
+def test_a_newcomer_looks_around(browser: Any, name: str) -> None:
     """Reads where the wearer is, turns and zooms the map, tries legend, tap, other floors and colours: nothing of that moves the estimate."""
     spot = PLACES[name]
     visit = Visit(spot)
     with visit.page:
         visit.walk(0.5)
-        with windows(browser, visit.page.url, tmp_path) as (pages, look):
+        with windows(browser, visit.page.url) as (pages, look):
             look("0-arrives")
             before = visit.estimates[-1]
             for page in pages:
@@ -101,13 +99,13 @@ def other_floor(page: Any, plan: Plan) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", PLACES)
-def test_a_responder_is_guided_and_calls(browser: Any, name: str, tmp_path: Path) -> None:
+def test_a_responder_is_guided_and_calls(browser: Any, name: str) -> None:
     """Goes to a room; is sent to one in distress by a commander; calls for help, and is all right again: on every window."""
     spot = PLACES[name]
     visit = Visit(spot)
     with visit.page:
         visit.walk(0.5)
-        with windows(browser, visit.page.url, tmp_path) as (pages, look):
+        with windows(browser, visit.page.url) as (pages, look):
             pages[2].select_option("#goal", label=spot.room)  # a phone held sideways
             for page in pages:
                 wait_for(page, "echostep.last.guidance?.own && echostep.last.guidance.path.length > 1")
