@@ -30,7 +30,6 @@ from page.browser import READY, TABLE_READY, loaded_page, overflow, violations, 
 from page.edit.drawing import answer, click, drag, status
 from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
-from page.sentences import editor_texts, host_texts, page_texts
 from page.web.test_page_sizes import RATES, UNREACHED, moments
 from plan.imported_plans import seven_floors
 from waiting import until
@@ -38,7 +37,6 @@ from waiting import until
 EDITOR_READY = "Boolean(window.echostep)"
 LOCALES = {"en": "en-GB", "de": "de-DE"}
 OTHERS = [name for name in LOCALES if name != "en"]
-STRANGE = "St. Mary, north: up 3"  # as people name rooms, stairs and each other
 HOLE = re.compile(r"\{(\w+)\}")
 MISSING = "[...echostep.missing]"
 LANG = "document.documentElement.lang"
@@ -115,62 +113,6 @@ def test_entries_have_the_holes_of_their_texts(lang: str) -> None:
     assert all(text.strip() for _, text in texts)
     assert all("other" in one for one in entries.values() if isinstance(one, dict))
     assert not [key for key in entries if key.endswith(".")]
-
-
-@pytest.mark.parametrize("lang", OTHERS)
-def test_names_stay_as_they_are_and_the_sentence_about_them_does_not(browser: Any, tmp_path: Path, lang: str) -> None:
-    """Names with full stops, commas and words that have entries, in every sentence that is long enough to be known by its other words."""
-    sentences = [key for key in catalogue(lang) if len(re.findall("[a-zA-Z]", HOLE.sub("", key))) >= 8]
-    named = [key for key in sentences if any(len(hole) > 1 for hole in HOLE.findall(key))]
-    assert len(named) > 30
-    filled = [HOLE.sub(lambda hole: "7" if len(hole[1]) == 1 else STRANGE, key) for key in named]
-    with EditServer(tmp_path / "new.json", port=0) as server:  # its page has all entries
-        page = page_of(browser, server.url, lang, EDITOR_READY)
-        translated = page.evaluate("(texts) => texts.map((text) => echostep.tr(text))", filled)
-        assert page.evaluate(MISSING) == []
-        assert [text for text in translated if STRANGE not in text] == []
-
-
-@pytest.mark.parametrize("lang", OTHERS)
-def test_every_text_of_the_source_has_an_entry(browser: Any, url: str, lang: str) -> None:
-    page = page_of(browser, url, lang, READY)
-    assert lang != "de" or page.inner_text("#title").startswith("A walk (simuliert, 3-fache Echtzeit): ")
-    texts = page_texts() | host_texts()
-    assert len(texts) > 200
-    page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
-    assert set(page.evaluate(MISSING)) - names(seven_floors()) - {"echostep", "GeoJSON"} == set()
-
-
-@pytest.mark.parametrize("lang", OTHERS)
-def test_every_text_of_the_editor_has_an_entry(browser: Any, tmp_path: Path, lang: str) -> None:
-    with EditServer(tmp_path / "new.json", port=0) as server, page_of(browser, server.url, lang, EDITOR_READY) as page:
-        texts = editor_texts()
-        assert len(texts) > 60
-        page.evaluate("(texts) => texts.forEach((text) => echostep.tr(text))", sorted(texts))
-        page.evaluate(
-            "import(`${location.href}static/words.js`).then(({ KINDS }) => Object.values(KINDS).forEach(echostep.tr))"
-        )
-        assert page.evaluate(MISSING) == []
-        asked = (
-            "Questions of the import: {}, marked on the plan. Answer them one by one, or draw and delete as you like"
-        )
-        told = [page.evaluate("(text) => echostep.tr(text)", asked.format(n)) for n in (1, 2)]
-        assert lang != "de" or [text.split(" des ")[0] for text in told] == ["1 Frage", "2 Fragen"]
-
-
-def test_a_text_without_entry_is_found(browser: Any, url: str) -> None:
-    page = page_of(browser, url, "de", READY)
-    assert (
-        page.evaluate("echostep.tr('lost: a new sentence. Turn left.')")
-        == "Position verloren: a new sentence. Links abbiegen."
-    )
-    assert "a new sentence" in page.evaluate(MISSING)
-    assert page.evaluate("echostep.tr('within 0.4 m · heading SE 135° ±5°')") == "auf 0,4 m genau · Kurs SO 135° ±5°"
-    assert page.evaluate("echostep.tr('2 floors up')") == "2 Geschosse höher"
-    assert page.evaluate("echostep.tr('1 floor up')") == "1 Geschoss höher"
-    assert page.evaluate("echostep.tr('Take the stairs 3 up')") == "Treppe 3 hinauf"
-    assert page.evaluate("echostep.tr('Take the lift A down.')") == "Aufzug A hinab."
-    assert page.evaluate("echostep.tr('Take the Nordtreppe up')") == "Nordtreppe hinauf"
 
 
 def test_how_a_language_is_chosen(browser: Any, url: str) -> None:
