@@ -26,23 +26,6 @@ def cube(side: float) -> Triangles:
     return np.array([corners[[a, b, c]] for p, q, r, s in faces for a, b, c in ((p, q, r), (p, r, s))])
 
 
-def test_a_cube_is_closed_and_has_its_volume() -> None:
-    assert is_closed(cube(2.0))
-    assert volume(cube(2.0)) == pytest.approx(8.0)
-
-
-def test_surfaces_that_are_not_closed_are_found() -> None:
-    whole = cube(2.0)
-    assert not is_closed(whole[1:])
-    assert not is_closed(whole[:, ::-1]), "inside out"
-    flipped = whole.copy()
-    flipped[0] = flipped[0, ::-1]
-    assert not is_closed(flipped)
-    assert not is_closed(np.concatenate([whole, whole + [2.0, 2.0, 0.0]])), "two cubes that share an edge only"
-    assert not is_closed(np.concatenate([whole, whole[:1, [0, 0, 1]]])), "a triangle without an area"
-    assert not is_closed(whole[:0])
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_box_and_its_lid_are_closed_fit_the_printer_and_hold_their_boards(name: str) -> None:
     box, lid = (read_stl(BOXES / f"{name}-{part}.stl") for part in PARTS)

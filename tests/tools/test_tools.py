@@ -95,11 +95,6 @@ def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFi
     assert "FAIL" not in said
 
 
-def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    assert start("hardware.nets") == 0
-    assert "each with one driver at a time" in capsys.readouterr().out
-
-
 @needs_twin
 def test_a_port_that_is_opened_again_begins_the_walk_anew(tmp_path: Path) -> None:
     """The true path then begins at the time of the second opening."""

@@ -128,30 +128,6 @@ def test_many_are_selected_and_deleted_in_one_step(browser: Any, house: EditServ
     assert not page.wrong
 
 
-def lasso(page: Any, *places: tuple[float, float]) -> None:
-    page.mouse.move(*spot(page, *places[0]))
-    page.mouse.down()
-    for place in places[1:]:
-        page.mouse.move(*spot(page, *place), steps=3)
-    page.mouse.up()
-
-
-def test_a_lasso_goes_round_what_stays(browser: Any, house: EditServer) -> None:
-    around = (1.5, 1.0), (7.0, 1.0), (7.0, 4.5), (4.5, 4.5), (4.5, 1.7), (1.5, 1.7)
-    page = opened(browser, house)
-    page.click("#lasso")
-    lasso(page, *around)
-    says(page, "Selected: 1")  # the obstacle, not the walls beside it
-    page.click("#rectangle")
-    page.keyboard.down("Alt")
-    lasso(page, *around)
-    page.keyboard.up("Alt")
-    says(page, "Selected: 1")
-    page.keyboard.press("Delete")
-    assert page.evaluate(LEFT) == [8, 1, 1, 0, 1, 1, 1]
-    assert not page.wrong
-
-
 def test_drawing_does_not_move_the_sheet_and_moving_it_draws_nothing(browser: Any, drawn: EditServer) -> None:
     page = opened(browser, drawn)
     begin = page.evaluate(VIEW)
