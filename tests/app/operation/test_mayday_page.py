@@ -13,7 +13,7 @@ from operation.teams import TOWER, ServedTeam, Team, place, whole_team
 from page.browser import TABLE_READY, loaded_page, spot, violations, wait_for
 from waiting import until
 
-SIZES = ((1280, 800), (360, 740), (740, 360), (320, 256))
+SIZES = ((1280, 800), (360, 740), (320, 256))
 LISTENS = """
     window.rung = 0; window.shaken = 0;
     const { createOscillator: create, resume } = AudioContext.prototype;

@@ -270,7 +270,7 @@ def test_keys_titles_and_what_was_said(browser: Any, url: str) -> None:
     assert not page.wrong
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", SIZES[::3])
 def test_the_tools_and_the_charts_keep_nobody_out(browser: Any, url: str, size: tuple[int, int]) -> None:
     page = looking(browser, url, {"viewport": {"width": size[0], "height": size[1]}})
     page.focus("#map")

@@ -28,7 +28,6 @@ PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 
 SEARCHED_S = 9.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
 WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])),))
-SIZES = ((1280, 800), (360, 740))
 INK = """(places) => {
     const canvas = document.querySelector('#canvas'), style = getComputedStyle(document.documentElement);
     const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
@@ -101,13 +100,12 @@ def test_a_single_place_is_listed_where_no_position_is_claimed(status: TrackStat
     assert len(shown_places(replace(estimate, hypotheses=PLACES))) == len(PLACES)
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: tuple[int, int]) -> None:
+def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any) -> None:
     """Marks of the wearer's colour are those of the places that fit, and no echo is drawn; a tracked wearer has all of them at the position."""
     lost, echoes = replace(told(13.0, 5.0, status=TrackStatus.LOST, sd_m=4.0), hypotheses=PLACES), scene().echo_lines
     with served() as (server, mailbox):
         mailbox.publish(replace(scene(), estimate=lost))
-        page = loaded_page(browser, server.url, {"viewport": {"width": size[0], "height": size[1]}}, READY)
+        page = loaded_page(browser, server.url, {"viewport": {"width": 360, "height": 740}}, READY)
 
         def marks(estimate: Estimate, t_s: float) -> tuple[int, int]:
             """Pixels of the wearer's colour away from the places that fit, and of the left echo's."""
