@@ -67,8 +67,10 @@ def log_lines(path: Path) -> list[str]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", ["live", "record"])
-@pytest.mark.parametrize("kind", ["full", "gone", "stopped", "closed"])
+@pytest.mark.parametrize(
+    ("kind", "command"),
+    [("full", "live"), ("gone", "live"), ("stopped", "live"), ("closed", "live"), ("full", "record")],
+)
 def test_a_run_outlasts_its_output(tmp_path: Path, kind: str, command: str) -> None:
     closed = [sys.executable, "-c", CLOSING, "12"] if kind == "closed" else []
     walk = tmp_path / "walk.mcap"
