@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -40,17 +40,20 @@ OUTBOX = "document.querySelector('#outbox').textContent"
 
 
 @pytest.fixture(scope="module")
-def feeders() -> Iterator[Callable[[str], Feeder]]:
-    """The process of a role, started once, that has carried out nothing yet."""
-    with ExitStack() as stack:
-        started: dict[str, Feeder] = {}
+def wearer() -> Iterator[Feeder]:
+    """A wearer's process for all tests; a commander's, whose mayday is acknowledged once, is one of each test."""
+    with Feeder("wearer") as feeder:
+        yield feeder
 
-        def feeder(role: str) -> Feeder:
-            if role not in started:
-                started[role] = stack.enter_context(Feeder(role))
-            started[role].lines.clear()
-            return started[role]
 
+@contextmanager
+def feeding(role: str, wearer: Feeder) -> Iterator[Feeder]:
+    """The process of a role, which has carried out nothing yet."""
+    if role == "wearer":
+        wearer.lines.clear()
+        yield wearer
+        return
+    with Feeder(role) as feeder:
         yield feeder
 
 
@@ -101,8 +104,8 @@ def printed(feeder: Feeder, words: str) -> int:
     return sum(words in line for line in feeder.lines)
 
 
-def check(browser: Any, feeder: Feeder, role: str, kind: str, size: tuple[int, int], *, reloads: bool = True) -> None:
-    with Wire(feeder.url) as wire:
+def check(browser: Any, wearer: Feeder, role: str, kind: str, size: tuple[int, int], *, reloads: bool = True) -> None:
+    with feeding(role, wearer) as feeder, Wire(feeder.url) as wire:
         page = loaded_page(browser, wire.url, {"viewport": {"width": size[0], "height": size[1]}}, READY[role])
         wait_for(page, f"{STATUS} === '{FRESH[role]}' && document.querySelector('#silence').hidden")
         page.evaluate(TOLD)
@@ -135,9 +138,9 @@ def check(browser: Any, feeder: Feeder, role: str, kind: str, size: tuple[int, i
 
 @pytest.mark.parametrize("role", READY)
 def test_a_program_that_stands_still_is_told_and_a_request_arrives_once(
-    browser: Any, feeders: Callable[[str], Feeder], role: str
+    browser: Any, wearer: Feeder, role: str
 ) -> None:
-    check(browser, feeders(role), role, "stopped", (360, 740), reloads=False)
+    check(browser, wearer, role, "stopped", (360, 740), reloads=False)
 
 
 @pytest.mark.long
@@ -146,9 +149,9 @@ def test_a_program_that_stands_still_is_told_and_a_request_arrives_once(
     ("kind", "size"), [(k, SIZES[1]) for k in ("frozen", "cut", "asleep")] + [("stopped", size) for size in SIZES]
 )
 def test_every_outage_and_one_at_every_size(
-    browser: Any, feeders: Callable[[str], Feeder], role: str, kind: str, size: tuple[int, int]
+    browser: Any, wearer: Feeder, role: str, kind: str, size: tuple[int, int]
 ) -> None:
-    check(browser, feeders(role), role, kind, size)
+    check(browser, wearer, role, kind, size)
 
 
 @pytest.mark.long
@@ -179,11 +182,8 @@ def test_a_call_survives_a_reload_and_the_end_of_the_program(browser: Any) -> No
         wait_for(page, "Object.keys(localStorage).filter((key) => key.startsWith('request')).length <= 3")
 
 
-def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(
-    browser: Any, feeders: Callable[[str], Feeder]
-) -> None:
-    feeder = feeders("wearer")
-    with Wire(feeder.url) as wire:
+def test_no_call_is_lost_by_a_clock_that_is_set_nor_in_one_of_two_tabs(browser: Any, wearer: Feeder) -> None:
+    with feeding("wearer", wearer) as feeder, Wire(feeder.url) as wire:
         page = loaded_page(browser, wire.url, {"viewport": {"width": 360, "height": 740}}, READY["wearer"])
         tab = page.context.new_page()
         tab.goto(wire.url)
