@@ -178,8 +178,7 @@ def replay(browser: Any, visit: Visit, place: Place, acting: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("acting", SIZES)
-@pytest.mark.parametrize("name", PLACES)
+@pytest.mark.parametrize(("name", "acting"), list(zip(PLACES, SIZES, strict=True)))
 def test_a_whole_visit(browser: Any, name: str, acting: str) -> None:
     place = PLACES[name]
     visit = Visit(place)
