@@ -176,10 +176,11 @@ def test_a_part_that_is_wrong_from_the_start_is_named(bench: Bench, failure: Fai
     assert measured(run(1_000))[failure.measures]
 
 
-SWAPPED = {
-    "barometers": ("part_pressure={}", ("scp1000", "bmp390")),
-    "compasses": ("part_compass={}", ("cmps10", "lis3mdl")),
-    "rangers": ("part_ranger_left={0} part_ranger_right={0}", ("srf02", "maxsonar", "pulse", "maxsonar", "srf02")),
+SWAPPED = {  # at first the parts are those of the papers
+    "barometers": ("part_pressure={}", ("bmp390",)),
+    "compasses": ("part_compass={}", ("lis3mdl",)),
+    "rangers of one bus": ("part_ranger_left={0} part_ranger_right={0}", ("maxsonar", "srf02")),
+    "rangers of two kinds": ("part_ranger_left={0} part_ranger_right={0}", ("pulse", "maxsonar")),
 }
 
 
@@ -187,16 +188,22 @@ SWAPPED = {
 def test_parts_may_be_swapped_in_mid_walk_and_survive_a_reset(bench: Bench, kind: str) -> None:
     run = begun(bench)
     plugged, parts = SWAPPED[kind]
+    everything = {"belt", "calf", "compass", "pressure", "ranger_left", "ranger_right", "thigh"}
+
+    def is_seen(part: str) -> bool:
+        """Whether all is measured in the next second, and the part is named."""
+        values = measured(run(1_000))
+        return {name for name in values if values[name]} == everything and part.upper() in {
+            m.Part(value).name for value in bench.parts[1:9]
+        }
+
     for part in parts:
         for switch in plugged.format(part).split():
             bench.fault(switch)
-        run(5_000)
-        everything = {"belt", "calf", "compass", "pressure", "ranger_left", "ranger_right", "thigh"}
-        assert set(measured(run(1_000))) == everything
-        assert part.upper() in {m.Part(value).name for value in bench.parts[1:9]}
+        assert any(is_seen(part) for _ in range(6))
         bench.fault("reset=watchdog")
         bench.subscribe()
-        run(2_000)
-        assert {p.outcome for p in run(1_000) if isinstance(p, m.Ping)} == {m.Outcome.ECHO}
+        pings = ({p.outcome for p in run(1_000) if isinstance(p, m.Ping)} for _ in range(3))
+        assert any(found == {m.Outcome.ECHO} for found in pings)
         after_a_crash = ("was not tested", "restarted")
         assert [text for text in findings(bench)[1:] if not any(words in text for words in after_a_crash)] == []

@@ -125,7 +125,7 @@ class Girard:
         self.rng = rng
         self.particles = [(*start, 1.0)]
 
-    def step(self, dx: float, dy: float, heading: float, pair: tuple[float, float]) -> tuple[float, float]:
+    def step(self, dx: float, dy: float, heading: float, pair: tuple[float, float] | None) -> tuple[float, float]:
         angles, shares = self.rng.uniform(0.0, 2.0 * math.pi, 20), np.sqrt(self.rng.uniform(0.0, 1.0, 20))
         vectors = [
             (dx + 0.25 * r * math.cos(a), dy + 0.25 * r * math.sin(a))
@@ -137,10 +137,13 @@ class Girard:
             for u, v in vectors
             if not crosses(x, y, x + u, y + v, self.walls)
         ]
-        heard = tuple(6.0 if math.isnan(z) else z for z in pair)
+        heard = [6.0 if math.isnan(z) else z for z in pair or ()]
         aperture = math.radians(55.0)
         weighed = []
-        for x, y, _ in merged(moved, 0.05):
+        for x, y, w in merged(moved, 0.05):
+            if pair is None:
+                weighed.append((x, y, w))
+                continue
             modelled = [
                 cone_reading(x, y, heading + side, self.walls, 7, aperture, 6.0)
                 for side in (0.5 * math.pi, -0.5 * math.pi)

@@ -36,17 +36,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.mark.long
-def test_a_dead_link_fails(tmp_path: Path) -> None:
-    pytest.importorskip("furo", reason="sphinx is not installed: no site is built")
-    (tmp_path / "in").mkdir()
-    (tmp_path / "in/page.md").write_text("# A page\n[a](gone-page.md) [b](#gone-anchor) ![c](gone-picture.png)\n")
-    done = build(tmp_path / "in", tmp_path / "out", "-D", "root_doc=page", "-D", "include_patterns=page.md")
-    assert done.returncode == 1
-    for named in ("gone-page.md", "gone-anchor", "gone-picture.png"):
-        assert re.search(rf"page\.md:\d+: .*{named}", done.stderr), done.stderr
-
-
 @pytest.mark.parametrize("width", [360, 1280])
 def test_the_search_finds_without_a_server_or_a_network(site: Path, browser: Any, width: int) -> None:
     page = opened_page(browser, viewport={"width": width, "height": 800})

@@ -90,6 +90,7 @@ def test_three_dead_beacons_in_a_row_are_a_gap_that_is_crossed() -> None:
         assert guided_return(world, OURS, seed).arrived
 
 
+@pytest.mark.long
 def test_equal_seeds_equal_returns() -> None:
     world = ground(NOMINAL, np.random.default_rng(4))
     one, two = (guided_return(world, OURS, 4) for _ in range(2))
@@ -97,10 +98,15 @@ def test_equal_seeds_equal_returns() -> None:
     assert one.believed.tobytes() == two.believed.tobytes()
 
 
-def test_every_row_has_its_share_of_returns() -> None:
+def test_the_cases_have_names_of_their_own() -> None:
     names = [case.name for case in cases()]
     assert len(set(names)) == len(names)
     assert {"pdr", "fischer2008", "default"} <= set(names)
+
+
+@pytest.mark.long
+def test_every_row_has_its_share_of_returns() -> None:
+    names = [case.name for case in cases()]
     rows = one_batch(0, first=1, runs=1)
     assert [row.name for row in rows] == names
     assert all(row.runs == 1 for row in rows)

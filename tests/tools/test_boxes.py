@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""The printed boxes: closed surfaces, room for their boards, STL files of the present sources; and the check of surfaces itself."""
+"""The printed boxes: closed surfaces, room for their boards, STL files of the present sources."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from hardware.boxes import BOXES, NAMES, PARTS, Triangles, is_closed, read_stl, render, size, volume
+from hardware.boxes import BOXES, NAMES, PARTS, is_closed, read_stl, render, size, volume
 
 PRINTER_MM = 180.0  # bed of a small printer
 BOARDS_MM = {  # boards that lie side by side in each box: length, width together, height with plugs and joints
@@ -18,29 +17,6 @@ BOARDS_MM = {  # boards that lie side by side in each box: length, width togethe
     "imu_clip": (25.4, 17.78, 10.0),
     "ankle_box": (48.0, 18.0 + 17.78, 12.0),
 }
-
-
-def cube(side: float) -> Triangles:
-    corners = np.array([[x, y, z] for x in (0, side) for y in (0, side) for z in (0, side)], dtype=float)
-    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return np.array([corners[[a, b, c]] for p, q, r, s in faces for a, b, c in ((p, q, r), (p, r, s))])
-
-
-def test_a_cube_is_closed_and_has_its_volume() -> None:
-    assert is_closed(cube(2.0))
-    assert volume(cube(2.0)) == pytest.approx(8.0)
-
-
-def test_surfaces_that_are_not_closed_are_found() -> None:
-    whole = cube(2.0)
-    assert not is_closed(whole[1:])
-    assert not is_closed(whole[:, ::-1]), "inside out"
-    flipped = whole.copy()
-    flipped[0] = flipped[0, ::-1]
-    assert not is_closed(flipped)
-    assert not is_closed(np.concatenate([whole, whole + [2.0, 2.0, 0.0]])), "two cubes that share an edge only"
-    assert not is_closed(np.concatenate([whole, whole[:1, [0, 0, 1]]])), "a triangle without an area"
-    assert not is_closed(whole[:0])
 
 
 @pytest.mark.parametrize("name", NAMES)

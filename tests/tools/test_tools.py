@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import json
 import os
-import re
 import signal
 import subprocess
 from collections.abc import Callable
@@ -16,11 +14,7 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT, needs_twin, tool
-from echostep_app.recording.recorder import Recorder
-from echostep_studies.speed import stages
-from reliability.fuzz import host
 from waiting import PATIENCE_S, until
-from walks import walk_chunks
 
 Start = Callable[..., int | None]
 
@@ -53,17 +47,6 @@ def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.
     assert len(said.partition("options:")[0]) > 60
 
 
-def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    with Recorder(tmp_path / "walk.mcap", {"seed": "1"}) as recorder:
-        for chunk in walk_chunks(8.0):
-            recorder.write(chunk)
-    start(stages.__name__, tmp_path / "walk.mcap", "--rounds", 1)
-    rows = re.findall(r"│ (\S.*?\S) +│ ([\d.]+) +│ \d+ +│", capsys.readouterr().out)
-    ms = {name: float(value) for name, value in rows}
-    assert {"foot samples", "cloud and estimates", "replay"} <= ms.keys()
-    assert ms["replay"] == pytest.approx(ms["bytes to legs and pings"] + ms["cloud and estimates"], abs=0.2)
-
-
 @pytest.mark.process
 def test_kills(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     for kills in (1, 2):
@@ -74,30 +57,12 @@ def test_kills(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str])
     assert len((tmp_path / "a.jsonl").read_text().splitlines()) == 2
 
 
-def test_mutated_inputs_go_on_where_they_stopped(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(host, "LOG", tmp_path / "host.jsonl")
-    monkeypatch.setattr(host, "SHARD_S", 0.1)
-    for shard in (1, 2):
-        assert start("reliability.fuzz.host", "--seconds", 0.2, "--targets", "person", "mqtt") == 0
-        assert f"host, shard {shard}:" in capsys.readouterr().out
-    runs = [json.loads(line) for line in (tmp_path / "host.jsonl").read_text().splitlines()]
-    assert [run["shard"] for run in runs] == [1, 2]
-    assert all(run["executions"]["mqtt"] > 10 for run in runs)
-
-
 @needs_twin
 def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     start("twin.measure", "--minutes", 0.1)
     said = capsys.readouterr().out
     assert said.count("PASS") > 20
     assert "FAIL" not in said
-
-
-def test_the_nets_of_the_boards_have_no_problem(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    assert start("hardware.nets") == 0
-    assert "each with one driver at a time" in capsys.readouterr().out
 
 
 @needs_twin

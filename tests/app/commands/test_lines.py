@@ -18,12 +18,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import echostep
-from board_runs import ROOT, tool
+from board_runs import ROOT
 from command_line import PROGRAM
 from command_line import echostep as run
 from echostep.errors import EchostepError
-from echostep.localization import digest
 from echostep.ports.chunks import LINES, MTX
 from echostep.recording import open_recording
 from echostep.xsens import MtxReader
@@ -36,7 +34,7 @@ from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineR
 from foot.foot_walks import MANNERS, course, samples
 from free_ports import free_port
 from players import pseudo_terminal
-from twin.line_foot import lines
+from twin.line_foot import lines, paced
 from waiting import until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
@@ -44,10 +42,11 @@ HEADER = "t_s,ax,ay,az,gx,gy,gz"
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a simulated walk of four steps."""
+    """The file of a simulated walk of two steps, without most of the time that the foot stands."""
     file = tmp_path_factory.mktemp("lines") / "imu.csv"
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=4), 100, rng=np.random.default_rng(1))
-    np.savetxt(file, np.column_stack([t_s, accel, gyro]), delimiter=",", header=HEADER, comments="", fmt="%.9g")
+    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=2), 100, rng=np.random.default_rng(1))
+    kept = (t_s > 1.5) & (t_s < t_s[-1] - 1.5)
+    np.savetxt(file, np.column_stack([t_s, accel, gyro])[kept], delimiter=",", header=HEADER, comments="", fmt="%.9g")
     return file
 
 
@@ -120,16 +119,18 @@ def test_a_live_run_without_a_board_is_replayed_bit_for_bit(walk: Path, tmp_path
     walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
     plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
     live = ("live", "--foot", "lines:-", "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
-    with subprocess.Popen([*tool("twin.line_foot"), str(walk)], stdout=subprocess.PIPE) as device:
-        done = subprocess.run(
-            [*PROGRAM, *map(str, live)], check=False, stdin=device.stdout, capture_output=True, text=True
-        )
-    assert done.returncode == 0, done.stderr
-    assert "foot in lines: 100 Hz; 0 lines were no sample" in done.stdout
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([*PROGRAM, *map(str, live)], text=True, **pipes) as running:  # type: ignore[call-overload]
+        assert running.stdin
+        for line in paced(walk):
+            running.stdin.write(f"{line}\n")
+            running.stdin.flush()
+        out, err = running.communicate()
+    assert running.returncode == 0, err
+    assert "foot in lines: 100 Hz; 0 lines were no sample" in out
     again = run("replay", tmp_path / "walk.mcap", "--plan", plan, "--headless", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "track.csv").read_bytes()
-    assert digest(echostep.replay(tmp_path / "walk.mcap", plan).estimates)[:16] in done.stdout
     text = b"".join(chunk.data for chunk in open_recording(tmp_path / "walk.mcap").chunks() if chunk.port == LINES)
     assert text.decode().split("\n")[:-1] == [line for _, line in lines(walk)]
 

@@ -94,29 +94,6 @@ def records(path: Path) -> bool:
     return True
 
 
-@pytest.mark.long
-@pytest.mark.process
-def test_ctrl_c_ends_a_live_run_with_its_files(tmp_path: Path) -> None:
-    ours, theirs = os.openpty()
-    port = os.ttyname(theirs)
-    live = subprocess.Popen(
-        [*PROGRAM, "live", "--plan", PLAN, "--board", port, "--out", tmp_path, "--headless"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        assert until(lambda: os.write(ours, b"\0") and records(tmp_path / "walk.mcap"))
-        live.send_signal(signal.SIGINT)
-        out, err = live.communicate(timeout=PATIENCE_S)
-    finally:
-        live.kill()
-        live.communicate()
-        os.close(ours)
-        os.close(theirs)
-    assert live.returncode == 0, err
-    assert "Traceback" not in err
-    assert "No estimate" in out
-
-
 TWO_PORTS = ("--board", "x", "--mtx", "y")
 MISTAKES: dict[str, list[object]] = {
     "no such recording": ["replay", "none.mcap", "--plan", PLAN],

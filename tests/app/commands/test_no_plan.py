@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +13,11 @@ import pytest
 from command_line import echostep
 from echostep.height.height_filter import RelativeHeight
 from echostep.height.levels import HeightChange
-from echostep.localization import TrackStatus
 from echostep.plan import NO_PLAN
-from echostep_app.page.elements.scene import status_text
 from echostep_app.session.metadata import run_metadata, start_recording
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
-from page.frames import PLAN, told
+from page.frames import PLAN
 
 
 @pytest.mark.slow
@@ -74,10 +71,3 @@ def test_without_a_foot_the_pressure_alone_tells_the_height() -> None:
     for _ in range(30):
         height.update(HeightChange(0.0, math.inf, 0.0, math.inf, 0.0, 10.0))
     assert height.sd_m > 3.0
-
-
-def test_the_page_says_the_height_against_the_start() -> None:
-    assert status_text(replace(told(), z_m=-3.2), no_plan=True) == "tracking, 3 m below the start, 0.2 m"
-    drifted = replace(told(), status=TrackStatus.LOST, xx_m2=16.0, yy_m2=16.0)
-    assert status_text(drifted, no_plan=True) == "lost, 10 m"
-    assert status_text(replace(told(), z_m=0.4), no_plan=True) == "tracking, 0.2 m"

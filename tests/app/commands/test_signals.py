@@ -83,7 +83,7 @@ def terminal_read(terminal: int) -> Iterator[Callable[[], None]]:
 
 @pytest.mark.long
 @pytest.mark.process
-@pytest.mark.parametrize("end", ["SIGTERM", "SIGQUIT", "closed"])
+@pytest.mark.parametrize("end", ["SIGINT", "SIGTERM", "closed"])
 def test_a_live_run_ends_with_a_whole_recording(tmp_path: Path, end: str) -> None:
     """A terminal that is closed sends SIGHUP."""
     with live_on_a_terminal(tmp_path, signal.SIG_DFL) as (live, close):

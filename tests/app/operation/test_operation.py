@@ -10,7 +10,7 @@ import pytest
 
 from echostep_app.operation import trails
 from echostep_app.operation.operation import MOST_EVENTS
-from echostep_app.operation.words import heard_words, place_words, tilt_words
+from echostep_app.operation.words import heard_words, tilt_words
 from echostep_app.team.messages.report import ReportedAlarm, decode, encode
 from operation.teams import TOWER, Team, place, whole_team
 from team.team_reports import POSITION, report
@@ -40,11 +40,6 @@ def test_the_fallen_the_lost_and_the_silent_come_first_each_in_words() -> None:
 )
 def test_how_long_ago_a_wearer_was_heard(silent_s: float, words: str) -> None:
     assert heard_words(silent_s) == words
-
-
-def test_without_a_safe_radius_the_95_percent_radius_is_said() -> None:
-    assert place_words(replace(POSITION, protection_m=None))[2] == "±0.8 m"
-    assert place_words(replace(POSITION, protection_m=12.34))[2] == "within 12 m"
 
 
 def test_a_report_carries_the_safe_radius_and_older_ones_have_none() -> None:

@@ -34,14 +34,13 @@ from operation.teams import Team, whole_team
 from operation.test_marks_and_alarms import Commander
 from operation.test_sent import SPEAKS
 from page.browser import HELD_MS, READY, Walk, loaded_page, overflow, wait_for
-from page.web.test_page_sizes import UNREACHED
+from page.web.test_page_sizes import SIZES, UNREACHED
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, report
 from waiting import until
 
 TEXT = "document.querySelector('#everybody-text').textContent"
-LOW = ((360, 740), (740, 360), (320, 256), (768, 1024), (1366, 768), (1920, 1080))
 
 
 def carry_out(team: Team, request: SetOrder | WriteNote) -> None:
@@ -155,9 +154,8 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         assert wearer.inner_text("#order-text") == f"Ben: {OUT}"
         assert wearer.evaluate("said").count(f"Ben: {OUT}") == 1
         for page in (wearer, table):
-            for width, height in LOW:
+            for width, height in SIZES:
                 page.set_viewport_size({"width": width, "height": height})
-                page.screenshot(path=tmp_path / f"{'wearer' if page is wearer else 'table'}-{width}.png")
                 assert overflow(page) == (0, 0), width
                 assert page.evaluate(UNREACHED) == [], (width, page is table)
         wearer.reload()  # what is not understood stays
@@ -170,7 +168,6 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         table.keyboard.press("Enter")
         assert until(lambda: exchanged(wearer, "!document.querySelector('#order').hidden"))
         assert wearer.inner_text("#order-text") == "Ben: Come to stairs B"
-        wearer.screenshot(path=tmp_path / "note.png")
         wearer.click("#understood")
         told = "document.querySelector('#history').innerText.includes('understood: Come to stairs B')"
         assert until(lambda: exchanged(table, told))

@@ -62,7 +62,6 @@ def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pyt
         assert rescuer.inner_text("#errand") == WORDS
         assert rescuer.evaluate("echostep.last.guidance.path.at(-1)") == list(MEETING_M)
         assert rescuer.evaluate("said").count(f"{WORDS}.") == 1
-        rescuer.screenshot(path=tmp_path / "sent.png")
         later = replace(POSITION, t_s=POSITION.t_s + 60.0)  # the first report may be outdated by now
         boxes[1].offer(report("bo", sequence=2, position=later))
         assert until(lambda: "sent to anna by Ben" in ben.look().rows[1].notes)

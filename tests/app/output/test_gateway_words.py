@@ -25,10 +25,3 @@ def test_impossible_readings_are_named(wrong: dict[str, int], words: str) -> Non
     gateway = Gateway()
     gateway.read(encode(GOOD._replace(**wrong), 0), 10.0)
     assert words in gateway_words(gateway)
-
-
-def test_second_unit_under_a_number_is_named() -> None:
-    gateway = Gateway()
-    for t_s, beacon in ((10.0, GOOD), (10.2, GOOD._replace(unit=1))):
-        gateway.read(encode(beacon, 0), t_s)
-    assert "two beacons have the number 7" in gateway_words(gateway)

@@ -112,14 +112,6 @@ def test_the_page_says_it_until_the_foot_walks_or_is_silent() -> None:
     assert [note[:8] for note in notes] == ["", "running:", "", "running:", ""]
 
 
-def test_the_terminal_says_it_below_the_status() -> None:
-    tracker, text = Tracker(PLAN), io.StringIO()
-    tracker._segment, tracker._estimate = RUN, told()
-    with TerminalView(tracker, "test", console=Console(file=text, force_terminal=True, width=100)) as view:
-        view.show([told()], final=True)
-    assert text.getvalue().index("tracking, 0.24 m") < text.getvalue().index("running: position good to about 0.2 m")
-
-
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (160, 60)])
 def test_the_terminal_is_filled_and_says_that_the_foot_is_silent(
     monkeypatch: pytest.MonkeyPatch, width: int, height: int

@@ -22,7 +22,7 @@ from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.summary import MOST_LINES, doors_in_gaps, size_m, summary
+from echostep_app.plan.importers.summary import doors_in_gaps, size_m, summary
 from plan.drawings.drawn_houses import write_house
 from plan.imported_plans import seven_floors
 
@@ -175,21 +175,6 @@ def test_the_picture_beside_the_plan(tmp_path: Path) -> None:
     (tmp_path / "plan.png").unlink()
     for _ in range(2):
         assert command_line.echostep(*command).stdout.endswith(f", {tmp_path / 'plan.png'}\n")
-
-
-def test_at_most_twelve_lines() -> None:
-    report = ImportReport(units="mm", layers={kind: [f"{kind}-{k}" for k in range(50)] for kind in ("walls", "doors")})
-    for k in range(40):
-        report.leave_out(f"LINE on layer {k}", 40 - k)
-        report.doubt(f"doubt {k}")
-    lines = summary(seven_floors(), report)
-    assert len(lines) <= MOST_LINES - 1  # the command adds the names of the files
-    text = "\n".join(lines)
-    assert "... and 2 levels more" in text
-    assert "left out: 40 LINE on layer 0, 39 LINE on layer 1" in text
-    assert "of 34 other kinds" in text
-    assert "note: doubt 0" in text
-    assert all(len(line) < 400 for line in lines)
 
 
 def test_doors_in_gaps_are_counted() -> None:

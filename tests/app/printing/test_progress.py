@@ -34,27 +34,6 @@ def test_a_line_says_what_is_done(monkeypatch: pytest.MonkeyPatch, terminal: boo
         assert until(lambda: "Preparing" in shown.getvalue())
 
 
-def test_what_is_quick_prints_nothing_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown = io.StringIO()
-    monkeypatch.setattr(progress, "console", Console(file=shown, force_terminal=False))
-    monkeypatch.setattr(progress, "SHOWN_AFTER_S", PATIENCE_S)
-    with progress.progress_line("Preparing"):
-        pass
-    assert list(progress.with_bar([1, 2], "counting", lambda: 0.5)) == [1, 2]
-    assert shown.getvalue() == ""
-
-
-def test_bars_fill(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown = io.StringIO()
-    console = Console(file=shown, force_terminal=True, width=100)
-    monkeypatch.setattr(progress, "console", console)
-    assert list(progress.with_bar(range(3), "tracking walk.mcap", lambda: 0.5)) == [0, 1, 2]
-    assert "tracking walk.mcap" in shown.getvalue()
-    with progress.listening_bar("Listening for 1 s", 1.0, console):
-        assert until(lambda: "0:00:00" in shown.getvalue())
-    assert "Listening for 1 s" in shown.getvalue()
-
-
 class Screen(io.StringIO):
     """Standard error, on a terminal or not."""
 
@@ -79,14 +58,6 @@ def compile_two() -> None:
     inner = numba.njit(lambda x: x + 1)
     numba.njit(lambda x: x - 1)(1)
     numba.njit(lambda x: inner(x))(1)  # noqa: PLW0108 (a kernel that calls a kernel)
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-def test_one_line_on_a_terminal(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> None:
-    screen = Screen(terminal=terminal)
-    monkeypatch.setattr(sys, "stderr", screen)
-    compile_two()
-    assert screen.getvalue() == (f"{COMPILING}\n" if terminal else "")
 
 
 def test_progress_that_is_shown_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,16 +65,6 @@ def test_a_broker_that_wants_another_certificate_of_the_client_says_so(
         assert told(url).endswith("give cert=FILE&key=FILE that its authority has signed, and that is valid today")
 
 
-def test_a_port_of_the_other_kind_is_told(tmp_path: Path, certificates: Certificates) -> None:
-    c = certificates
-    with Broker(tmp_path) as broker:
-        assert "is it the port of its TLS (one without needs mqtt:// or" in told(
-            f"mqtts://127.0.0.1:{broker.port}{c.query()}"
-        )
-    with Broker(tmp_path, f"certfile {c.server}", f"keyfile {c.server}") as broker:
-        assert "One with TLS needs mqtts://" in told(f"mqtt://127.0.0.1:{broker.port}")
-
-
 def test_a_wrong_password_names_what_to_check(tmp_path: Path) -> None:
     (tmp_path / "passwords").write_text("")
     with Broker(tmp_path, f"password_file {tmp_path / 'passwords'}") as broker:

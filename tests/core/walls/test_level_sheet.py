@@ -38,8 +38,6 @@ from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario
 from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tour, tower
 
-FLAT = HeightChange(0.0, 0.02, 0.0, math.inf, 0.0, 1.0)
-
 
 def tracked(
     plan: Plan, waypoints: list[Waypoint], seed: int, start: Pose | None = None

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -45,6 +45,14 @@ def random_samples(seed: int, n: int = 300) -> tuple[Floats, Floats, Floats, Flo
     gyro = rng.standard_normal((n, 3)) * np.where(loud, 4.0, 0.1)
     matrices = np.array([any_rotation(rng) for _ in range(n)])
     return t, accel, gyro, matrices
+
+
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The filter on board as plain Python, which is sooner done than compiled; the tests that are `long` compile it."""
+    for name, value in list(vars(onboard).items()):
+        if hasattr(value, "py_func"):
+            monkeypatch.setattr(onboard, name, value.py_func)
 
 
 # ---- slow twins ----
@@ -212,8 +220,9 @@ def test_the_filter_takes_an_acceleration_for_a_lean_and_a_turned_field_for_nort
     assert yaw == pytest.approx(0.5 * np.pi * (1.0 - np.exp(-9.0 / 5.0)), rel=0.02)
 
 
+@pytest.mark.usefixtures("interpreted")
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=20)
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_the_filter_s_matrices_are_rotations_whatever_comes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     n = 50
@@ -249,6 +258,7 @@ def samples(tmp_path: Path) -> Path:
     return write_csv(tmp_path / "imu.csv", "t_s,ax,ay,az,gx,gy,gz,mx,my,mz", np.column_stack([t, accel, gyro, mag]))
 
 
+@pytest.mark.usefixtures("interpreted")
 def test_foot_walks_by_either_profile(samples: Path, tmp_path: Path) -> None:
     ends = {}
     for profile in ("default", "fischer2008"):
@@ -263,6 +273,7 @@ def test_foot_walks_by_either_profile(samples: Path, tmp_path: Path) -> None:
     assert ends["fischer2008"] != ends["default"]
 
 
+@pytest.mark.usefixtures("interpreted")
 def test_without_a_magnetometer_the_paper_s_profile_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     t, accel, gyro, _, _ = walked()
     table = np.column_stack([t, noisy(accel), noisy(gyro)])
@@ -293,6 +304,7 @@ def test_real_stances_are_found_with_the_threshold_as_it_was_set() -> None:
 
 
 @needs_recordings
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize(("name", "bound_percent"), [("31", 20.0), ("33", 15.0)])
 def test_a_real_walk_with_its_sensor_s_own_matrix_comes_out_short_as_in_the_paper(
     name: str, bound_percent: float

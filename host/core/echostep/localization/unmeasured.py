@@ -23,6 +23,7 @@ from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.02
 PRIOR = 1e-4  # that it begins with the stand
 BASE_S = 1.0  # of a stand, in which the rangers hear what is there
+FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
 STEP_M, STEP_RAD = 0.2, 0.35  # of a step that is no shuffle: its way, or its turn
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
@@ -53,6 +54,9 @@ class UnmeasuredWay:
     def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
         """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
         segment, before = measured.segment, self.probability
+        if math.hypot(segment.dx_m, segment.dy_m) > FASTEST_M_S * max(segment.t1_s - segment.t0_s, 0.0):
+            segment = replace(segment, dx_m=0.0, dy_m=0.0, sd_m=WALKER_M_S * FOLLOWED_S, aloft=True)
+            measured = replace(measured, segment=segment)
         is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
         odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
@@ -99,7 +103,8 @@ class UnmeasuredWay:
             return 0.0
         if min(abs(range_m - b) for b in base) < ALIKE_M:
             return AS_BEFORE
-        if abs(range_m - last_m) < ALIKE_M:
+        if abs(range_m - last_m) < ALIKE_M:  # it stays: a passer-by may have hidden it
+            base.append(range_m)
             return 0.0
         return FARTHER if range_m > max(base) else NEARER
 

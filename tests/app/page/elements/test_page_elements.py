@@ -60,13 +60,6 @@ def test_a_player_plays_stops_seeks_and_steps() -> None:
     assert at(504.0) == 10.0
 
 
-def test_status_in_words() -> None:
-    assert status_text(told()) == "tracking, 0.2 m"
-    assert status_text(told(sd_m=1.2, status=TrackStatus.UNCERTAIN)) == "uncertain, 3 m"
-    assert status_text(told(status=TrackStatus.LOST)) == "lost: walk along a wall or tap where you are"
-    assert status_text(None, needs_start=True) == "tap where you stand to start"
-
-
 def test_an_errand_finds_its_way_around_walls() -> None:
     destination, here, goal = Destination(RoutePlace(13.0, 4.5)), told(9.0, 7.5), RoutePlace(13.0, 4.5)
     looking = destination.guidance_at(here)

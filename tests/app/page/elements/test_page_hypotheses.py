@@ -25,10 +25,9 @@ from page.frames import LOCAL, PLAN, scene, served, told
 from page.test_page_browser import STILL, ink_near
 
 PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
-SEARCHED_S = 6.0  # of the demo's walk: along one of two corridors that are alike
+SEARCHED_S = 9.0  # of the demo's walk: along one of two corridors that are alike
 DRAWN = "document.querySelector('#places').textContent"
 WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])),))
-SIZES = ((1280, 800), (360, 740))
 INK = """(places) => {
     const canvas = document.querySelector('#canvas'), style = getComputedStyle(document.documentElement);
     const { data, width } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
@@ -53,7 +52,7 @@ def test_words_for_places_for_a_plan_that_does_not_fit_and_for_neither() -> None
     assert status_text(replace(told(status=TrackStatus.TRACKING), hypotheses=PLACES)).startswith("tracking")
 
 
-def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> None:
+def test_places_that_fit_are_drawn_and_told(browser: Any) -> None:
     estimate = replace(told(5.0, 7.5, status=TrackStatus.UNCERTAIN), protection_m=math.inf, hypotheses=PLACES)
     with served() as (server, mailbox):
         mailbox.publish(replace(scene(), estimate=estimate, status_text=status_text(estimate)))
@@ -61,7 +60,6 @@ def test_places_that_fit_are_drawn_and_told(browser: Any, tmp_path: Path) -> Non
         wait_for(page, f"{DRAWN}.includes('31 %')")
         assert page.evaluate(DRAWN) == "places that fit: 1 in North corridor 62 % · 2 in South corridor 31 %"
         assert "within" not in page.text_content("#place")
-        page.screenshot(path=tmp_path / "places.png")
         mailbox.publish(replace(scene(2.0), estimate=replace(told(t_s=2.0), protection_m=0.4)))
         wait_for(page, "document.querySelector('#places').hidden")
         assert "within 0.40 m · heading E 090° ±1°" in page.text_content("#place")
@@ -102,19 +100,17 @@ def test_a_single_place_is_listed_where_no_position_is_claimed(status: TrackStat
     assert len(shown_places(replace(estimate, hypotheses=PLACES))) == len(PLACES)
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
+def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any) -> None:
     """Marks of the wearer's colour are those of the places that fit, and no echo is drawn; a tracked wearer has all of them at the position."""
     lost, echoes = replace(told(13.0, 5.0, status=TrackStatus.LOST, sd_m=4.0), hypotheses=PLACES), scene().echo_lines
     with served() as (server, mailbox):
         mailbox.publish(replace(scene(), estimate=lost))
-        page = loaded_page(browser, server.url, {"viewport": {"width": size[0], "height": size[1]}}, READY)
+        page = loaded_page(browser, server.url, {"viewport": {"width": 360, "height": 740}}, READY)
 
         def marks(estimate: Estimate, t_s: float) -> tuple[int, int]:
             """Pixels of the wearer's colour away from the places that fit, and of the left echo's."""
             mailbox.publish(replace(scene(t_s), estimate=replace(estimate, t_s=t_s), echo_lines=echoes))
             wait_for(page, f"echostep.last.t_s === {t_s} && {STILL}")
-            page.screenshot(path=tmp_path / f"{size[0]}-{estimate.status}-{len(estimate.hypotheses)}.png")
             away, echo = page.evaluate(INK, [[p.x_m, p.y_m] for p in estimate.hypotheses])
             return int(away), int(echo)
 
@@ -127,7 +123,7 @@ def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any, size: t
         assert not page.wrong
 
 
-def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any, tmp_path: Path) -> None:
+def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any) -> None:
     way = guidance_of_cue(Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "", 7.5, 0.1), WAY, 0, None)
     with served() as (server, mailbox):
         mailbox.publish(replace(scene(), guidance=way))
@@ -135,7 +131,6 @@ def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any, tmp_path: Pat
         for t_s, status, shown in ((2.0, TrackStatus.LOST, False), (3.0, TrackStatus.TRACKING, True)):
             mailbox.publish(replace(scene(t_s), estimate=told(13.0, 5.0, t_s, status), guidance=way))
             wait_for(page, f"echostep.last.t_s === {t_s} && {STILL}")
-            page.screenshot(path=tmp_path / f"way-{status}.png")
             assert page.evaluate("echostep.last.guidance.path.length") == 2
             assert [ink_near(page, 2.0 + 7.5 * share, 7.5) for share in (0.1, 0.5, 0.9)] == [shown] * 3
         assert not page.wrong

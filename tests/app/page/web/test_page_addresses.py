@@ -81,14 +81,6 @@ def test_a_code_is_printed_for_other_machines_on_a_terminal(url: str, terminal: 
     assert ("█▀▀▀▀▀█" in text) == coded
 
 
-def test_without_the_package_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("echostep_app.extras.find_spec", lambda _: None)
-    said = io.TextIOWrapper(io.BytesIO(), "utf-8")
-    print_page(Console(file=said, force_terminal=True, soft_wrap=True), (URL,))
-    said.seek(0)
-    assert "its QR code needs segno, which is not installed: pip install 'echostep[page]'" in said.read()
-
-
 def account(name: str, uid: int, shell: str) -> pwd.struct_passwd:
     return pwd.struct_passwd((name, "x", uid, uid, "", f"/home/{name}", shell))
 

@@ -47,7 +47,7 @@ def opened(browser: Any, url: str, size: tuple[int, int], ready: str) -> Any:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_the_wearer_is_seen_under_every_message(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
+def test_the_wearer_is_seen_under_every_message(browser: Any, size: tuple[int, int]) -> None:
     plan = seven_floors()
     with served(Mailbox(plan, "echostep live", replay=False)) as (server, mailbox):
         mailbox.publish(scene())
@@ -64,12 +64,11 @@ def test_the_wearer_is_seen_under_every_message(browser: Any, size: tuple[int, i
             page.evaluate(EVERY_MESSAGE)
             mailbox.publish(replace(bad, t_s=t_s + 0.5, estimate=estimate, streams=RATES, gait=RUNNING))
             wait_for(page, f"echostep.last.t_s === {t_s + 0.5}")
-            page.screenshot(path=tmp_path / f"{size[0]}-{x_m:.0f}.png")
             assert until(lambda x_m=x_m: page.evaluate(ABOVE, [x_m, 7.5]) == []), page.evaluate(ABOVE, [x_m, 7.5])  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_who_has_fallen_is_seen_under_every_message(browser: Any, size: tuple[int, int], tmp_path: Path) -> None:
+def test_who_has_fallen_is_seen_under_every_message(browser: Any, size: tuple[int, int]) -> None:
     team = Team()
     x_m, y_m = TOWER.levels[2].rooms[0].at_m
     for name in ("Anna", "Eve"):
@@ -91,7 +90,6 @@ def test_who_has_fallen_is_seen_under_every_message(browser: Any, size: tuple[in
                 page,
                 f"!document.querySelector('#crew-due').hidden && echostep.last?.unix_s === {json.dumps(team.unix_s)}",
             )
-            page.screenshot(path=tmp_path / f"fallen-{size[0]}-{name}.png")
             assert page.evaluate(ABOVE, [x_m + far_m, y_m]) == [], name
 
 

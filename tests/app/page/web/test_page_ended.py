@@ -26,16 +26,15 @@ ENDED = "ended: mean error 0.06 m, at most 0.16 m. ▶ plays it again"
 FITS = "echostep.view.shows([1, 1, 25, 13])"
 STATUS = "document.getElementById('words').dataset.status"
 SAYS = "document.getElementById('status-text').textContent"
-SIZES = {"desk": {"width": 1280, "height": 720}, "phone": {"width": 360, "height": 640}}
+PHONE = {"width": 360, "height": 640}
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp_path: Path, size: str) -> None:
+def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any) -> None:
     t_s = np.arange(0.0, 20.0, 0.1)
     tracker, chunks = Tracker(PLAN, seed=1), walk_chunks()
     with LivePage(tracker, "echostep demo (simulated, 4 x real time)", LOCAL, keeps=True) as live:
         live.truth = TruePath(np.column_stack([t_s, 2.0 + 0.5 * t_s, 7.5 + 0.0 * t_s, 0.0 * t_s]))
-        page = opened_page(browser, viewport=SIZES[size])
+        page = opened_page(browser, viewport=PHONE)
         page.goto(live.url)
         for k in range(0, len(chunks), 20):
             portion = portion_of(chunks[k : k + 20])
@@ -47,7 +46,6 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
         live.mailbox.end("mean error 0.06 m, at most 0.16 m")
         wait_for(page, f"{SAYS} === '{ENDED}'")
         wait_for(page, f"!document.getElementById('replay').hidden && {SETTLED} && {FITS}")  # beside the time bar
-        page.screenshot(path=tmp_path / f"ended-{size}.png")
         assert page.get_attribute("#words", "data-status") == "ended"
         green = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--good')")
         assert page.evaluate("getComputedStyle(document.getElementById('mark')).color") != rgb(green)
@@ -61,16 +59,15 @@ def test_a_page_says_that_the_run_has_ended_and_plays_it_again(browser: Any, tmp
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("size", "error"),
+    "error",
     [
-        ("phone", EchostepError("/dev/ttyACM0: the firmware is older than this program: echostep flash writes it")),
-        ("desk", OSError(28, "No space left on device", "out/live/walk.mcap")),
+        EchostepError("/dev/ttyACM0: the firmware is older than this program: echostep flash writes it"),
+        OSError(28, "No space left on device", "out/live/walk.mcap"),
     ],
 )
 def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
     browser: Any,
     tmp_path: Path,
-    size: str,
     error: Exception,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -78,7 +75,7 @@ def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
     pages: list[Any] = []
 
     def portions(url: str) -> Iterator[Portion]:
-        pages.append(opened_page(browser, viewport=SIZES[size]))
+        pages.append(opened_page(browser, viewport=PHONE))
         pages[0].goto(url)
         chunks = walk_chunks()
         for k in range(0, len(chunks), 500):
@@ -101,7 +98,6 @@ def test_an_error_that_ends_the_run_is_on_the_page_in_the_words_of_the_terminal(
     assert page.inner_text("#fault") == said
     page.evaluate("echostep.link.wait = 50")
     wait_for(page, "echostep.link.failures > 4")  # the server is away; that it does not answer is no other error
-    page.screenshot(path=tmp_path / f"failed-{size}.png")
     assert page.inner_text("#fault") == said
 
 
