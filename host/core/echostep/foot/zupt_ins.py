@@ -30,6 +30,7 @@ GAP_S = 0.25  # shorter gaps are propagated over
 MOVING_GAP_S = 0.08
 STRAY_SAMPLES = 20  # this many samples in a row with earlier times: the clock was set back
 WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
+MOST_M_S = 20.0  # of a sprinter's foot in its swing
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
 STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
 LOST_SHARE = 0.3  # sd of the part that such a reading omits, as a share of the reading
@@ -178,6 +179,13 @@ def _navigate(
     """One sample of navigation: propagate, detect stance, update, write events."""
     dt, t_s, accel, gyro = sample
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
+    if (
+        ins.dot(nav.velocity, nav.velocity) > MOST_M_S**2
+    ):  # a push that was taken for a tilt, wrong samples: nothing that was learnt is right
+        for i in range(3):
+            nav.gyro_bias[i] = 0.0
+            nav.accel_bias[i] = 0.0
+        return _restart(s, nav, sums, compass, dt, events, event_count)
     _inflate_at_limits(s, nav, dt, accel, gyro)
     s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak, s.rate_plateau)
     if not s.in_stance:

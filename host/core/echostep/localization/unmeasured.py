@@ -14,25 +14,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
 # Assumed, not measured. Rates (1/s) at which such a way begins: with a witness, and where the rangers have fallen silent
-BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.02
+BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.03
 PRIOR = 1e-4  # that it begins with the stand
-BASE_S = 1.0  # of a stand, in which the rangers hear what is there
 FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
 STEP_M, STEP_RAD = 0.2, 0.35  # of a step that is no shuffle: its way, or its turn
+SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
-ALOFT, STEPPED = 8.0, -4.0
-# Of half a second of a ranger
-AS_BEFORE = math.log(0.8 / 0.95)  # a wall goes on
-NEARER = math.log(0.2 / 0.12)  # a passer-by, a cupboard
-FARTHER = math.log(0.2 / 0.03)  # a door that somebody opens, a corner
+ALOFT, STEPPED = 8.0, -2.5
+# Of a ping that hears what a ranger has heard in this stand: in half a second of a way most walls go on
+AS_BEFORE = math.log(0.8 / 0.95) / 7.0
+# Of two pings in a row that hear something new: a passer-by or a cupboard; a door that somebody opens, or a corner
+NEARER, FARTHER = math.log(0.2 / 0.12), math.log(0.2 / 0.03)
 
 
 class UnmeasuredWay:
@@ -77,36 +75,34 @@ class UnmeasuredWay:
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        if is_step or segment.unobserved:
-            self._look_anew(segment.t1_s)
-            if not segment.aloft:
-                is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
-                return STEPPED if is_long else 0.0
+        if is_step and not segment.aloft:
+            is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
+            if is_long or segment.unobserved:
+                self._look_anew(segment.t1_s)
+                return STEPPED
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
-        for k in (0, 1):
-            ranges = measured.range_m[(measured.ranger == k) & (measured.range_m > 0.0)]
-            if len(ranges):
-                ratio += self._compared(k, float(np.median(ranges)), segment.t1_s)
+        for which, t_s, range_m in zip(
+            measured.ranger.tolist(), measured.t_s.tolist(), measured.range_m.tolist(), strict=True
+        ):
+            ratio += self._compared(which, range_m, t_s)
         return ratio
 
     def _look_anew(self, t_s: float) -> None:
         """From here on the rangers hear something else."""
-        self._base: tuple[list[float], list[float]] = ([], [])
-        self._last, self._base_s = [math.nan, math.nan], t_s + BASE_S
+        self._heard: tuple[list[float], list[float]] = ([], [])
+        self._last, self._settled_s = [math.nan, math.nan], t_s + SETTLING_S
 
-    def _compared(self, ranger: int, range_m: float, t_s: float) -> float:
-        """Log-likelihood ratio of what a ranger hears in a piece of the stand."""
-        base, last_m = self._base[ranger], self._last[ranger]
-        self._last[ranger] = range_m
-        if t_s < self._base_s or not base:
-            base.append(range_m)
-            return 0.0
-        if min(abs(range_m - b) for b in base) < ALIKE_M:
+    def _compared(self, which: int, range_m: float, t_s: float) -> float:
+        """Log-likelihood ratio of a ping of the stand; NaN: no echo."""
+        heard, last_m, self._last[which] = self._heard[which], self._last[which], range_m
+        if any(abs(range_m - h) < ALIKE_M for h in heard):
             return AS_BEFORE
-        if abs(range_m - last_m) < ALIKE_M:  # it stays: a passer-by may have hidden it
-            base.append(range_m)
+        if not abs(range_m - last_m) < ALIKE_M:
             return 0.0
-        return FARTHER if range_m > max(base) else NEARER
+        heard.append(range_m)
+        if len(heard) == 1 or t_s < self._settled_s:
+            return 0.0
+        return FARTHER if range_m > max(heard[:-1]) else NEARER
 
     def _spread(self, segment: PathSegment) -> PathSegment:
         """Any way up to a walker's speed since the stand began, whatever the foot measured; beyond FOLLOWED_S the building is searched."""
