@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""The study `doubt`: what is not measured is not claimed, in short."""
+
+from __future__ import annotations
+
+import pytest
+
+from echostep_studies.doubt.study import KINDS, doubt_run
+
+FALSE_S = 2.0  # in a row
+
+
+@pytest.mark.parametrize("name", ["fallen-off", "carried"])
+def test_a_foot_that_lies_is_not_believed(name: str) -> None:
+    (row,) = doubt_run([name], 3)
+    assert row.false_s < FALSE_S
+    assert row.end_m < 1.0  # by the legs, or found again
+
+
+@pytest.mark.parametrize("name", ["none", "passers-by"])
+def test_who_passes_sets_nothing_off(name: str) -> None:
+    (row,) = doubt_run([name], 7702)
+    assert (row.false_s, row.tracking > 0.98) == (0.0, True)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in KINDS if not name.startswith(("start", "plan"))])
+def test_every_kind_is_honest(name: str) -> None:
+    assert doubt_run([name], 2)[0].false_s < FALSE_S
