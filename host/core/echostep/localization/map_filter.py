@@ -20,7 +20,7 @@ from echostep.height.height_filter import RelativeHeight, RidingHeight
 from echostep.height.levels import Air, HeightChange
 from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
-from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
+from echostep.localization.cloud_estimate import estimate_of, weight_about
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
@@ -86,7 +86,7 @@ class MapFilter:
 
     def stated(self, t_s: float, walk_heading_rad: float, step: int) -> Estimate:
         """The estimate at a start that has just been stated."""
-        return estimate_of(self.cloud, t_s, walk_heading_rad, step, 0.0, Right(STATED))
+        return estimate_of([(self.cloud, STATED)], t_s, walk_heading_rad, step)
 
     @property
     def echo(self) -> EchoSettings:
@@ -303,23 +303,16 @@ class MapFilter:
     def _estimate(self, segment: PathSegment) -> Estimate:
         """The estimate at the end of a segment."""
         belief = self.belief
+        stood = 1.0 - self._unmeasured.probability
+        mixture = [(each.cloud, stood * belief.probability(each)) for each in belief.clouds]
         hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
         map_sd_m = self._map_sd_m()
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
-        stood = 1.0 - self._unmeasured.probability
-        right = Right(stood * belief.right, stood * belief.probability(belief.search))
-        search = belief.search.cloud if belief.search else None
-        new = estimate_of(
-            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self.building.elsewhere, search,
-            map_sd_m,
+        return estimate_of(
+            mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
+            self._height and (self._height.height_m, self._height.sd_m), belief.plan_fits,
+            self.building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
         )  # fmt: skip
-        if self._height is not None:
-            new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
-        return replace(
-            new,
-            plan_fits=belief.plan_fits,
-            outside=self.building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
-        )
 
     def _map_sd_m(self) -> float:
         """Standard deviation per axis of a drawing where the tracked cloud is; 0 on other plans."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
-from echostep.localization.particles.places import LikelyPlace, hypotheses
+from echostep.localization.particles.places import hypotheses
 from echostep.localization.settings import CloudSettings
 from echostep.particles.arrays import DrawnPoses, ParticleArrays
 from echostep.particles.limits import ROOM_M
@@ -122,10 +122,6 @@ class Particles:
         """Mean of `hidden_shares`."""
         return float(self.hidden_shares.mean())
 
-    def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
-        """The likeliest places of the trunk, the likeliest first."""
-        return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
-
     @property
     def place_share(self) -> float:
         """Weight of the likeliest place, on any level; 0 if none has enough to be listed."""
@@ -139,8 +135,10 @@ class Particles:
 
     @property
     def level_shares(self) -> Floats:
-        """Weight on each level up to the highest that has any (k,)."""
-        return np.asarray(np.bincount(self.level, self.weight), np.float64)
+        """Weight on each level of the plan (levels,)."""
+        if self.sheet is None:
+            return np.ones(1)
+        return np.asarray(np.bincount(self.level, self.weight, len(self.sheet.height_m)), np.float64)
 
     def level_at(self, x_m: float) -> int:
         """Level of an x on the sheet."""
