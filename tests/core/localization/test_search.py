@@ -36,8 +36,9 @@ def gather(grid: SearchGrid, share: float) -> None:
 
 
 def searching(map_filter: MapFilter) -> Search:
-    assert isinstance(map_filter.cloud, Search)
-    return map_filter.cloud
+    search = map_filter.belief.tracked.cloud
+    assert isinstance(search, Search)
+    return search
 
 
 def test_a_ping_counts_by_the_way_since_the_one_before() -> None:
@@ -77,19 +78,18 @@ def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: f
     gather(search.grid, share)
     found = search.found()
     assert (found is None) == is_searching
-    shown = found or search
+    shown = found or search.particles
     near = np.hypot(shown.x_m - 6.05, shown.y_m - 4.05) < 0.5
     assert float(shown.weight @ near) == pytest.approx(share, abs=0.02)
 
 
-def test_particles_show_a_search_as_it_is_weighed() -> None:
-    """As a meeting does: by every state of the grid."""
-    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    cloud.show_every_state()
-    assert len(cloud.x_m) == len(cloud.grid)
-    cloud.reweight(np.where(cloud.x_m < 6.0, -3.0, 0.0))
-    assert cloud.found() is None
-    east = float(cloud.weight @ (cloud.x_m > 6.0))
+def test_particles_are_the_states_of_a_search_as_it_is_weighed() -> None:
+    """As a meeting does."""
+    search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
+    assert len(search.particles.x_m) == len(search.grid)
+    search.reweight(np.where(search.particles.x_m < 6.0, -3.0, 0.0))
+    assert search.found() is None
+    east = float(search.particles.weight @ (search.particles.x_m > 6.0))
     assert east == pytest.approx(1.0 / (1.0 + math.exp(-3.0)), abs=0.02)
 
 
@@ -118,14 +118,15 @@ def test_a_search_that_has_left_all_ground_begins_anew() -> None:
 
 
 def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
-    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    gather(cloud.grid, 0.9)
+    search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
+    gather(search.grid, 0.9)
     step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
     assert step.unobserved
     after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    after.belief.tracked.cloud = cloud
+    after.belief.tracked.cloud = search
     after.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
-    assert cloud.found() is None
+    cloud = search.particles
+    assert search.found() is None
     assert 0.5 < float(cloud.weight @ (np.hypot(cloud.x_m - 6.05, cloud.y_m - 4.05) < 3.0 * step.sd_m)) < 0.95
 
 

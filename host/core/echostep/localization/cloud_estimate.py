@@ -106,7 +106,7 @@ def estimate_of(
     """
     (cloud, right), *rivals = mixture
     weight, shares = cloud.weight, _shares(mixture)
-    levels = tuple(sum(share * each.level_shares for (each, _), share in zip(mixture, shares, strict=True)).tolist())
+    levels = tuple((shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
     z = float(weight @ cloud.z_m)
     height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
@@ -136,13 +136,13 @@ def estimate_of(
     )  # fmt: skip
 
 
-def _shares(mixture: Mixture) -> list[float]:
-    """Probability of each cloud, if the trunk is in one of them."""
-    total = sum(probability for _, probability in mixture)
-    return [probability / total if total > 0.0 else 1.0 / len(mixture) for _, probability in mixture]
+def _shares(mixture: Mixture) -> Floats:
+    """Probability (n,) of each cloud, if the trunk is in one of them."""
+    probability = np.array([probability for _, probability in mixture])
+    return probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
 
 
-def _places(mixture: Mixture, shares: list[float], walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+def _places(mixture: Mixture, shares: Floats, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
     """The likely places of the trunk, if it is in one of the clouds."""
     each = [
         (cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, share * cloud.weight)

@@ -27,6 +27,7 @@ from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
+from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.unmeasured import FOLLOWED_S, UnmeasuredWay
@@ -107,9 +108,9 @@ class MapFilter:
         return self._pings.odometer
 
     @property
-    def cloud(self) -> Cloud | Search:
-        """The cloud that is tracked, or the search if there is none."""
-        return self.belief.tracked.cloud
+    def cloud(self) -> Particles:
+        """The particles of the cloud that is tracked; all states of the search, if there is none."""
+        return self.belief.tracked.cloud.particles
 
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
@@ -178,7 +179,7 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
-        if self.cloud.is_searching or not len(self.building.floor.x_m):
+        if not isinstance(self.cloud, Cloud) or not len(self.building.floor.x_m):
             return
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
@@ -233,7 +234,7 @@ class MapFilter:
         clouds, share = belief.clouds, evidence_share(segment.turn_rad)
         for each in clouds:
             if isinstance(each.cloud, Search):
-                each.weigh(share * each.cloud.advance(move, pings, self._model), 0.0)
+                each.weigh(share * each.cloud.grid.advance(move, pings, self._model), 0.0)
             else:
                 self._follow_with(each, each.cloud, move, pings, unplanned, share)
         belief.weigh_heights([each.change_levels(move, change) for each in clouds])
@@ -281,21 +282,23 @@ class MapFilter:
         if self._is_found_here():
             belief.merge()
         if len(pings.share) and belief.right > PROBABLE:  # bounded by its prior
-            self._bias.learn_behind(self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model)
+            cloud = self.cloud
+            self._bias.learn_behind(cloud.arrays, cloud.weight, move, pings, self.building.walls, self._model)
 
     def _is_found_here(self) -> bool:
         """Whether a search has found the place of the tracked cloud."""
-        if self.belief.search is None or self.belief.search.cloud.is_searching:
+        cloud, tracked = self.belief.search and self.belief.search.cloud, self.cloud
+        if not isinstance(cloud, Cloud):
             return False
-        cloud, mean = self.belief.search.cloud, self._believed(0.0)
-        place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
+        mean = self._believed(0.0)
+        place_m = mean.x_m, mean.y_m, float(tracked.weight @ tracked.z_m)
         near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         return near > PROBABLE
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
-        cloud, weight = self.cloud, self.cloud.weight
-        level = cloud.likeliest_level
+        cloud = self.cloud
+        weight, level = cloud.weight, cloud.likeliest_level
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
@@ -304,14 +307,15 @@ class MapFilter:
         """The estimate at the end of a segment."""
         belief = self.belief
         stood = 1.0 - self._unmeasured.probability
-        mixture = [(each.cloud, stood * belief.probability(each)) for each in belief.clouds]
-        hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
+        mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.clouds]
+        cloud, _ = mixture[0]
+        hidden_sd_m = HIDDEN_SD_M * cloud.hidden_share
         map_sd_m = self._map_sd_m()
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         return estimate_of(
             mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
-            self._height and (self._height.height_m, self._height.sd_m), belief.plan_fits,
-            self.building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
+            None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
+            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight),
         )  # fmt: skip
 
     def _map_sd_m(self) -> float:

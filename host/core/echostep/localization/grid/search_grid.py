@@ -211,9 +211,9 @@ class SearchGrid:
         log_weight: Floats = np.log(np.maximum(self._states.weight, least).astype(np.float64))
         return self._poses(np.arange(len(self))), log_weight - log_weight.max()
 
-    def reweight(self, log_weight: Floats) -> None:
-        """Replace the log-weights of all states."""
-        self._weigh_anew(np.exp(log_weight - log_weight.max()))
+    def reweight(self, log_factor: Floats) -> None:
+        """Multiply the weights of all states by factors, given as logarithms (n,)."""
+        self._weigh_anew(self._states.weight * np.exp(log_factor - log_factor.max()))
 
     def _poses(self, chosen: Ints) -> DrawnPoses:
         """The middles of states (n,)."""

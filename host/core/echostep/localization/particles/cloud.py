@@ -70,7 +70,7 @@ def cloud_about(
     z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
     lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
     poses = DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m)
-    cloud = Cloud(poses, settings, rng, sheet, climbing or ClimbSettings(), start.lag_variance)
+    cloud = Cloud(poses, settings, rng, sheet, start.lag_variance, climbing or ClimbSettings())
     cloud.shrink(log_weight)
     return cloud
 
@@ -86,6 +86,20 @@ class Cloud(Particles):
     is_searching: ClassVar[bool] = False
 
     is_gathered, is_on_any_level = False, False
+
+    def __init__(
+        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
+        lag_variance: float, climbing: ClimbSettings,
+    ) -> None:  # fmt: skip
+        """`sheet`: of several levels, or None. `lag_variance`: in m2."""
+        super().__init__(poses, np.zeros(len(poses.x_m)), sheet, lag_variance, climbing)
+        self._settings, self._rng = settings, rng
+        self.scale += settings.start_scale_sd * rng.standard_normal(len(self.scale))
+
+    @property
+    def particles(self) -> Particles:
+        """The cloud: a search has to make its particles."""
+        return self
 
     def shrink(self, log_weight: Floats) -> None:
         """Keep as many of the first particles, which were drawn with these log-weights (n,), as a start needs."""
