@@ -11,7 +11,6 @@ import pytest
 from echostep.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization import Building, CloudSettings, MapFilter, Start
 from echostep.localization.grid.search import FOUND_REST, Search
-from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import cloud_about
 from echostep.particles.arrays import PingBatch
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
@@ -29,10 +28,10 @@ def pings(range_m: float, count: int, travel_m: float = 1.0) -> PingBatch:
     return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), travels, one, 0.0 * one, one, one)
 
 
-def gather(grid: SearchGrid, share: float) -> None:
+def gather(search: Search, share: float) -> None:
     """Give this share of the weight to the middle of the room, and the rest to all of it."""
     there = np.full(50, 6.05), np.full(50, 4.05), np.linspace(0.0, 6.2, 50)
-    grid.begin_about(*there, share)
+    search.begin_about(*there, share)
 
 
 def searching(map_filter: MapFilter) -> Search:
@@ -75,7 +74,7 @@ def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
 @pytest.mark.parametrize(("share", "is_searching"), [(0.8, True), (1.0 - 0.3 * FOUND_REST, False)])
 def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_searching: bool) -> None:
     search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    gather(search.grid, share)
+    gather(search, share)
     found = search.found()
     assert (found is None) == is_searching
     shown = found or search.particles
@@ -86,7 +85,7 @@ def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: f
 def test_particles_are_the_states_of_a_search_as_it_is_weighed() -> None:
     """As a meeting does."""
     search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    assert len(search.particles.x_m) == len(search.grid)
+    assert len(search.particles.x_m) == len(search)
     search.reweight(np.where(search.particles.x_m < 6.0, -3.0, 0.0))
     assert search.found() is None
     east = float(search.particles.weight @ (search.particles.x_m > 6.0))
@@ -96,8 +95,7 @@ def test_particles_are_the_states_of_a_search_as_it_is_weighed() -> None:
 def test_a_search_turns_with_the_walk_frame() -> None:
     """Straight ahead is where it was on the map, and so is the heading."""
     map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    grid = searching(map_filter).grid
-    grid.begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
+    searching(map_filter).begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
     map_filter.turn_walk_frame(0.5 * math.pi)
     map_filter.update(MeasuredSegment(a_step(0.0, -1.0), NONE, NO_RANGERS, NONE))
     place = map_filter.cloud
@@ -119,7 +117,7 @@ def test_a_search_that_has_left_all_ground_begins_anew() -> None:
 
 def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
     search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    gather(search.grid, 0.9)
+    gather(search, 0.9)
     step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
     assert step.unobserved
     after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
@@ -132,8 +130,8 @@ def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
 
 def test_a_search_in_a_room_begins_there() -> None:
     outline = np.array([[0, 0], [6, 0], [6, 8], [0, 8]], float)
-    grid = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1))).grid
-    assert grid.draw(1000, np.random.default_rng(1)).x_m.max() < 6.3
+    search = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1)))
+    assert search.draw(1000).x_m.max() < 6.3
 
 
 def test_a_start_that_is_a_place_is_no_search() -> None:

@@ -146,8 +146,8 @@ class MapFilter:
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
-        for each in self.belief.clouds:
-            each.cloud.turn_walk_frame(by_rad)
+        for part in self.belief.parts:
+            part.turn_walk_frame(by_rad)
         self._way.clear()
 
     def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud | Search:
@@ -161,8 +161,7 @@ class MapFilter:
     def _search_from(self, start: Start, walk_heading_rad: float) -> Search:
         """A search on the floor, which there is."""
         s, b = self._settings, self.building
-        grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s)
-        return Search(grid, start, s.cloud, self._rng, b.sheet, s.climb)
+        return grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
         """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
@@ -200,11 +199,11 @@ class MapFilter:
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         if anew:
             self._barometer_starts = measured.barometer_starts
-        for each in self.belief.clouds:
+        for part in self.belief.parts:
             if anew:
-                each.cloud.forget_lag()
+                part.forget_lag()
             else:
-                each.cloud.let_lag_drift(self._gaps.pause_s)
+                part.let_lag_drift(self._gaps.pause_s)
         if anew:
             self._riding.forget()
             if self._height is not None:
@@ -234,7 +233,7 @@ class MapFilter:
         clouds, share = belief.clouds, evidence_share(segment.turn_rad)
         for each in clouds:
             if isinstance(each.cloud, Search):
-                each.weigh(share * each.cloud.grid.advance(move, pings, self._model), 0.0)
+                each.weigh(share * each.cloud.advance(move, pings, self._model), 0.0)
             else:
                 self._follow_with(each, each.cloud, move, pings, unplanned, share)
         belief.weigh_heights([each.change_levels(move, change) for each in clouds])

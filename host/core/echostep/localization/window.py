@@ -55,7 +55,7 @@ class RecentWay:
         """Let a search process the way from its beginning; returns the log of its density of the pings over the density without a plan."""
         log_pings = 0.0
         for move, pings, change in self._pieces:
-            log_pings += search.grid.advance(move, pings, model)
+            log_pings += search.advance(move, pings, model)
             search.change_levels(move, change)
         return log_pings
 
