@@ -297,7 +297,7 @@ class MapFilter:
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
         cloud = self.cloud
-        weight, level = cloud.weight, cloud.likeliest_level
+        weight, level = cloud.weight, int(cloud.level_shares.argmax())
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)

@@ -142,20 +142,15 @@ def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     return variance
 
 
-def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
-    """Weigh the cloud by a range to a teammate's beacon; returns the probability that the range is right, given the cloud.
+def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
+    """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud.
 
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
     """
     right = weigh(each.cloud, meeting, area_m2)
-    if not each.cloud.is_searching:
+    if meeting.beacon is not None and not each.cloud.is_searching:
         before = each.doubts.get(meeting.name, 0.0)
         after = before + meeting.share * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
         each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
         each.log_weight += each.doubts[meeting.name] - before
     return right
-
-
-def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
-    """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud."""
-    return weigh(each.cloud, meeting, area_m2) if meeting.beacon is None else weigh_range(each, meeting, area_m2)

@@ -100,26 +100,15 @@ class Particles(PressureLag):
         return weight
 
     @property
-    def hidden_shares(self) -> Floats:
-        """Probability (2,) that the view of each ranger is hidden."""
-        shares: Floats = self.hidden @ self.weight
-        return shares
-
-    @property
     def hidden_share(self) -> float:
-        """Mean of `hidden_shares`."""
-        return float(self.hidden_shares.mean())
+        """Probability that the view of a ranger is hidden, mean of both."""
+        return float((self.hidden @ self.weight).mean())
 
     @property
     def place_share(self) -> float:
         """Weight of the likeliest place, on any level; 0 if none has enough to be listed."""
         places = hypotheses(self.map_x_m, self.y_m, np.zeros(len(self.x_m), np.int64), self.turn_rad, self.weight)
         return places[0].probability if places else 0.0
-
-    @property
-    def likeliest_level(self) -> int:
-        """The level with the most weight."""
-        return int(self.level_shares.argmax())
 
     @property
     def level_shares(self) -> Floats:
