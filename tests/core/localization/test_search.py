@@ -82,11 +82,11 @@ def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: f
     assert float(shown.weight @ near) == pytest.approx(share, abs=0.02)
 
 
-def test_particles_are_the_states_of_a_search_as_it_is_weighed() -> None:
+def test_particles_show_a_search_as_it_is_weighed() -> None:
     """As a meeting does."""
     search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    assert len(search.particles.x_m) == len(search)
-    search.reweight(np.where(search.particles.x_m < 6.0, -3.0, 0.0))
+    assert len(search.states.x_m) == len(search)
+    search.reweight(np.where(search.states.x_m < 6.0, -3.0, 0.0))
     assert search.found() is None
     east = float(search.particles.weight @ (search.particles.x_m > 6.0))
     assert east == pytest.approx(1.0 / (1.0 + math.exp(-3.0)), abs=0.02)

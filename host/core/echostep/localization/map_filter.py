@@ -109,7 +109,7 @@ class MapFilter:
 
     @property
     def cloud(self) -> Particles:
-        """The particles of the cloud that is tracked; all states of the search, if there is none."""
+        """The particles of the cloud that is tracked, or of the search if there is none."""
         return self.belief.tracked.cloud.particles
 
     def update(self, measured: MeasuredSegment) -> Estimate:

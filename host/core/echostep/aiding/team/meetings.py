@@ -90,7 +90,7 @@ def places_at(cloud: Particles, meeting: Meeting) -> Floats:
 
 def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
-    particles = cloud.particles
+    particles = cloud.states
     place = places_at(particles, meeting)
     if cloud.sheet is None:
         on_level, levels = np.full(len(place), meeting.level == 0), 1

@@ -238,11 +238,21 @@ class Search(PressureLag):
         return Cloud(poses, self._settings, self._rng, self.sheet, self.lag_variance, self._climbing)
 
     @property
-    def particles(self) -> Particles:
+    def states(self) -> Particles:
         """All states, each in the middle of its cell and sector."""
         log_weight: Floats = np.log(np.maximum(self._states.weight, np.finfo(np.float32).tiny).astype(np.float64))
-        poses = self._poses(np.arange(len(self)))
-        return Particles(poses, log_weight - log_weight.max(), self.sheet, self.lag_variance, self._climbing)
+        return self._particles(np.arange(len(self)), log_weight - log_weight.max())
+
+    @property
+    def particles(self) -> Particles:
+        """All states, or if there are more than a cloud may have, so many by weight."""
+        most = self._settings.largest
+        if len(self) <= most:
+            return self.states
+        return self._particles(systematic(self._states.weight.astype(np.float64), 0.5, most), np.zeros(most))
+
+    def _particles(self, chosen: Ints, log_weight: Floats) -> Particles:
+        return Particles(self._poses(chosen), log_weight, self.sheet, self.lag_variance, self._climbing)
 
     def reweight(self, log_factor: Floats) -> None:
         """Multiply the weights of all states by factors, given as logarithms (n,)."""

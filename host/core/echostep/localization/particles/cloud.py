@@ -101,6 +101,8 @@ class Cloud(Particles):
         """The cloud: a search has to make its particles."""
         return self
 
+    states = particles
+
     def shrink(self, log_weight: Floats) -> None:
         """Keep as many of the first particles, which were drawn with these log-weights (n,), as a start needs."""
         count = min(max(self._wanted_size(), START_SIZE), len(self.x_m))
