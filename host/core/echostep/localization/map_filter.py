@@ -261,14 +261,11 @@ class MapFilter:
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self.building.has_walls:
-            log_ratio = float(unplanned.counts @ (evidence.log_pings - alone))
-            each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
-
-    def _passed(self, move: Move, log_passed: float) -> float:
-        """The part that counts of the log of a cloud's share that crossed no wall."""
-        if self.belief.search is not None:
-            return log_passed
-        return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
+            log_ratio, log_passed = float(unplanned.counts @ (evidence.log_pings - alone)), evidence.log_path
+            if self.belief.search is None:
+                path_m = math.hypot(move.dx_m, move.dy_m)
+                log_passed = self._crossed.charge(self._believed(0.0), path_m, log_passed)
+            each.weigh(share * log_ratio, log_passed)
 
     def _compare(self, segment: PathSegment, move: Move, pings: PingBatch) -> None:
         """Update the belief after a move: end improbable clouds, and merge clouds in one place; learn the bias where the likeliest is."""
@@ -309,17 +306,11 @@ class MapFilter:
         mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.clouds]
         cloud, _ = mixture[0]
         hidden_sd_m = HIDDEN_SD_M * cloud.hidden_share
-        map_sd_m = self._map_sd_m()
+        at, drawn = self._believed(0.0), self.building.drawn
+        map_sd_m = drawn.sd_m(at.x_m, at.y_m, at.level)
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         return estimate_of(
             mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
             None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
             self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight),
         )  # fmt: skip
-
-    def _map_sd_m(self) -> float:
-        """Standard deviation per axis of a drawing where the tracked cloud is; 0 on other plans."""
-        if not self.building.drawn.are_stated:
-            return 0.0
-        at = self._believed(0.0)
-        return self.building.drawn.sd_m(at.x_m, at.y_m, at.level)

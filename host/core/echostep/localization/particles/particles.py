@@ -117,10 +117,6 @@ class Particles(PressureLag):
             return np.ones(1)
         return np.asarray(np.bincount(self.level, self.weight, len(self.sheet.height_m)), np.float64)
 
-    def level_at(self, x_m: float) -> int:
-        """Level of an x on the sheet."""
-        return int(level_of(np.array([x_m]), self.sheet)[0]) if self.sheet else 0
-
     def far_weight(self, x_m: Floats) -> float:
         """Weight further than ROOM_M from the mean, by x (n,) on the sheet or in the map."""
         weight = self.weight
