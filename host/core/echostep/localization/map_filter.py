@@ -178,7 +178,7 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
-        if not isinstance(self.cloud, Cloud) or not len(self.building.floor.x_m):
+        if self.belief.tracked.cloud.is_searching or not len(self.building.floor.x_m):
             return
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
@@ -189,7 +189,7 @@ class MapFilter:
         """Search the building along the last metres of the path."""
         search = self._search_from(start, walk_heading_rad)
         self.belief.begin_search(search, self._way.search(search, self._model))
-        if isinstance(self.cloud, Cloud):
+        if not self.belief.tracked.cloud.is_searching:
             self.belief.tracked.table = grid_about(
                 self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
@@ -283,11 +283,10 @@ class MapFilter:
 
     def _is_found_here(self) -> bool:
         """Whether a search has found the place of the tracked cloud."""
-        cloud, tracked = self.belief.search and self.belief.search.cloud, self.cloud
-        if not isinstance(cloud, Cloud):
+        if self.belief.search is None or self.belief.search.cloud.is_searching:
             return False
-        mean = self._believed(0.0)
-        place_m = mean.x_m, mean.y_m, float(tracked.weight @ tracked.z_m)
+        cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
+        place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         return near > PROBABLE
 

@@ -208,14 +208,14 @@ class Search(PressureLag):
         rest, least_m = (FOUND_REST, 0.0) if self.sheet is None else (LEVELS_REST, LEVELS_M)
         if self.path_m < least_m:
             return None
-        if self._densest_share(TRACED_M2_RAD) <= 1.0 - FOUND_REST and self.particles.place_share <= 1.0 - rest:
+        if self.densest_share(TRACED_M2_RAD) <= 1.0 - FOUND_REST and self.particles.place_share <= 1.0 - rest:
             return None
         cloud = self.draw(self._settings.largest)
         cloud.contract()
         cloud.is_on_any_level = self.is_on_any_level
         return cloud
 
-    def _densest_share(self, size_m2_rad: float) -> float:
+    def densest_share(self, size_m2_rad: float) -> float:
         """Weight of the heaviest states that together have this size."""
         weight = self._states.weight
         count = int(size_m2_rad / (CELL_M**2 * 2.0 * math.pi / len(self._states.offset_m)))
