@@ -48,19 +48,16 @@ SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a 
 NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
 
 
-Places = tuple[Floats, Floats]  # x, y (n,) on the sheet (m)
-
-
 class Search(PressureLag):
     """The weights of all poses on the grid. `is_on_any_level`: nothing is known of the level."""
 
     is_searching: ClassVar[bool] = True
 
     def __init__(
-        self, cells: GridCells, places: Places, unplanned: RangeMemory, start: Start, sheet: LevelSheet | None,
+        self, cells: GridCells, places: tuple[Floats, Floats], unplanned: RangeMemory, start: Start, sheet: LevelSheet | None,
         settings: FilterSettings, rng: np.random.Generator,
     ) -> None:  # fmt: skip
-        """Begin evenly at these places, with any rotation. `unplanned`: density without a plan, as inexact as the table."""
+        """Begin evenly at these places x, y (n,) on the sheet, with any rotation. `unplanned`: density without a plan, as inexact as the table."""
         super().__init__(start.lag_variance, settings.climb)
         self.sheet, self._settings, self._rng = sheet, settings.cloud, rng
         self.is_on_any_level = sheet is not None and start.is_on_any_level
