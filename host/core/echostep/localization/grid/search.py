@@ -43,6 +43,7 @@ MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of the weight that a neighbour gets at m
 # Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods
 # discriminate between levels that are alike, and need a path to do so; assumed
 FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
+SHOWN = 5_000  # states that stand for all of a larger search
 TRACED_M2_RAD = 5.0  # poses that 20,000 particles fill by the sizes of `CloudSettings`: 6,000 cells
 SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
@@ -242,11 +243,10 @@ class Search(PressureLag):
 
     @property
     def particles(self) -> Particles:
-        """All states, or if there are more than a cloud may have, so many by weight."""
-        most = self._settings.largest
-        if len(self) <= most:
+        """All states, or if there are more than SHOWN, so many by weight."""
+        if len(self) <= SHOWN:
             return self.states
-        return self._particles(systematic(self._states.weight.astype(np.float64), 0.5, most), np.zeros(most))
+        return self._particles(systematic(self._states.weight.astype(np.float64), 0.5, SHOWN), np.zeros(SHOWN))
 
     def _particles(self, chosen: Ints, log_weight: Floats) -> Particles:
         return Particles(self._poses(chosen), log_weight, self.sheet, self.lag_variance, self._climbing)
