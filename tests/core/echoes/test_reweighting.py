@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from echostep.echoes.reweighting import (
     CloudModel,
     EchoMemory,
     MoveProgress,
-    WeightedPing,
     propagate_and_reweight,
     reweight_by_ping,
 )
@@ -33,7 +33,19 @@ def source_list() -> SourceList:
     return SourceList(np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES))
 
 
-def written_out(distance_m: float, hidden: float, ping: WeightedPing) -> tuple[float, float]:
+class OnePing(NamedTuple):
+    """The k-th values of a `PingBatch`."""
+
+    range_m: float
+    power: float
+    travel_m: float
+    stray: float
+    missed: float
+    alike: float
+    unplanned: float
+
+
+def written_out(distance_m: float, hidden: float, ping: OnePing) -> tuple[float, float]:
     """Likelihood of a ping of one wall straight ahead, and the probability that the view is hidden after it."""
     level_db = 20.0 * math.log10(6.0 / distance_m) + 2.6 * (6.0 - distance_m)
     heard = 1.0 / (1.0 + math.exp(-level_db / 2.0))
@@ -65,14 +77,16 @@ def test_the_kernel_is_the_formula(
     stray: float,
 ) -> None:
     missed = 0.02 if range_m == 0.0 else 0.0
-    ping = WeightedPing(0.5 * math.pi, range_m, power, travel_m, stray, missed, alike, unplanned)
+    ping = OnePing(range_m, power, travel_m, stray, missed, alike, unplanned)
     y_m, hidden = (np.array(column) for column in zip(*places, strict=True))
     zeros = np.zeros(len(y_m))
     particles = ParticleArrays(zeros.copy(), y_m.copy(), zeros.copy(), np.ones(len(y_m)), zeros.copy())
     expected = [written_out(2.0 - y, h, ping) for y, h in zip(y_m.tolist(), hidden.tolist(), strict=True)]
     arrays = begin_segment(particles)
+    range_1, power_1, *others = (np.array([value]) for value in ping)
+    pings = PingBatch(np.ones(1), np.array([0.5 * math.pi]), range_1, power_1, np.zeros(1, np.int64), *others)
     log_evidence, _, top = reweight_by_ping(
-        particles, arrays, hidden, ping, MODEL, 1.0, WALL.near(zeros, y_m), source_list()
+        particles, arrays, hidden, pings, 0, MODEL, 1.0, WALL.near(zeros, y_m), source_list()
     )
     end_segment(particles, arrays, top)
     likelihood = np.array([each[0] for each in expected])

@@ -222,7 +222,7 @@ def test_a_place_that_is_found_twice_is_one() -> None:
 @pytest.mark.parametrize(("fits", "status"), [(PLAN_FITS, TrackStatus.TRACKING), (0.7, TrackStatus.UNCERTAIN)])
 def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: TrackStatus) -> None:
     on_it = filter_at(HERE)
-    on_it.belief = Belief(on_it.cloud, 0.999, fits)
+    on_it.belief = Belief(on_it.belief.tracked.cloud, 0.999, fits)
     estimate = after_a_step(on_it)
     assert estimate.plan_fits == pytest.approx(fits, abs=0.01)
     assert estimate.right == pytest.approx(0.999 * (fits if fits < SURE else 1.0), abs=0.01)
@@ -233,7 +233,7 @@ def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: Track
 def test_a_cloud_that_is_doubted_is_searched_for_and_not_claimed(start: Start, status: TrackStatus) -> None:
     doubted = filter_at(HERE)
     doubted._way.begin = wide(start)  # as long as all of the way from there is known; then anywhere
-    doubted.belief = Belief(doubted.cloud, 0.2, PLAN_FITS)
+    doubted.belief = Belief(doubted.belief.tracked.cloud, 0.2, PLAN_FITS)
     estimate = after_a_step(doubted)
     assert doubted.belief.search is not None
     assert doubted.belief.search.cloud.is_searching
@@ -248,7 +248,7 @@ def test_a_wall_that_is_not_there_costs_a_believed_cloud_its_price_once() -> Non
         values[:] = 0.0
     costs = []
     for k, dx_m in enumerate([2.0, -2.0]):
-        through.belief = Belief(through.cloud, 0.99999, 0.999)
+        through.belief = Belief(through.belief.tracked.cloud, 0.99999, 0.999)
         step = PathSegment(k, k + 1.0, dx_m, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
         fits = through.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE)).plan_fits
         costs.append(math.log(fits / (1.0 - fits)) - math.log(0.999 / 0.001))

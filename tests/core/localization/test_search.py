@@ -11,7 +11,6 @@ import pytest
 from echostep.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
 from echostep.localization import Building, CloudSettings, MapFilter, Start
 from echostep.localization.grid.search import FOUND_REST, Search
-from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import cloud_about
 from echostep.particles.arrays import PingBatch
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
@@ -29,15 +28,16 @@ def pings(range_m: float, count: int, travel_m: float = 1.0) -> PingBatch:
     return PingBatch(0.0 * one, one, range_m * one, one, np.zeros(count, np.int64), travels, one, 0.0 * one, one, one)
 
 
-def gather(grid: SearchGrid, share: float) -> None:
+def gather(search: Search, share: float) -> None:
     """Give this share of the weight to the middle of the room, and the rest to all of it."""
     there = np.full(50, 6.05), np.full(50, 4.05), np.linspace(0.0, 6.2, 50)
-    grid.begin_about(*there, share)
+    search.begin_about(*there, share)
 
 
 def searching(map_filter: MapFilter) -> Search:
-    assert isinstance(map_filter.cloud, Search)
-    return map_filter.cloud
+    search = map_filter.belief.tracked.cloud
+    assert isinstance(search, Search)
+    return search
 
 
 def test_a_ping_counts_by_the_way_since_the_one_before() -> None:
@@ -74,30 +74,28 @@ def test_a_ping_knows_whether_that_before_it_was_silent() -> None:
 @pytest.mark.parametrize(("share", "is_searching"), [(0.8, True), (1.0 - 0.3 * FOUND_REST, False)])
 def test_a_search_is_over_when_nearly_all_of_its_weight_is_in_one_place(share: float, is_searching: bool) -> None:
     search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    gather(search.grid, share)
+    gather(search, share)
     found = search.found()
     assert (found is None) == is_searching
-    shown = found or search
+    shown = found or search.particles
     near = np.hypot(shown.x_m - 6.05, shown.y_m - 4.05) < 0.5
     assert float(shown.weight @ near) == pytest.approx(share, abs=0.02)
 
 
 def test_particles_show_a_search_as_it_is_weighed() -> None:
-    """As a meeting does: by every state of the grid."""
-    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    cloud.show_every_state()
-    assert len(cloud.x_m) == len(cloud.grid)
-    cloud.reweight(np.where(cloud.x_m < 6.0, -3.0, 0.0))
-    assert cloud.found() is None
-    east = float(cloud.weight @ (cloud.x_m > 6.0))
+    """As a meeting does."""
+    search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
+    assert len(search.states.x_m) == len(search)
+    search.reweight(np.where(search.states.x_m < 6.0, -3.0, 0.0))
+    assert search.found() is None
+    east = float(search.particles.weight @ (search.particles.x_m > 6.0))
     assert east == pytest.approx(1.0 / (1.0 + math.exp(-3.0)), abs=0.02)
 
 
 def test_a_search_turns_with_the_walk_frame() -> None:
     """Straight ahead is where it was on the map, and so is the heading."""
     map_filter = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    grid = searching(map_filter).grid
-    grid.begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
+    searching(map_filter).begin_about(np.full(9, 6.05), np.full(9, 4.05), np.full(9, 0.1), 1.0)
     map_filter.turn_walk_frame(0.5 * math.pi)
     map_filter.update(MeasuredSegment(a_step(0.0, -1.0), NONE, NO_RANGERS, NONE))
     place = map_filter.cloud
@@ -118,21 +116,22 @@ def test_a_search_that_has_left_all_ground_begins_anew() -> None:
 
 
 def test_a_search_that_moves_unobserved_begins_about_where_it_was() -> None:
-    cloud = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
-    gather(cloud.grid, 0.9)
+    search = searching(MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1)))
+    gather(search, 0.9)
     step = PathSegment(0.0, 2.0, 0.0, 0.0, 0.0, 0.0, sd_m=1.1 * UNOBSERVED_SD_M, turn_sd_rad=0.1, step=0)
     assert step.unobserved
     after = MapFilter(ROOM, Start(), 0.0, np.random.default_rng(1))
-    after.belief.tracked.cloud = cloud
+    after.belief.tracked.cloud = search
     after.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE))
-    assert cloud.found() is None
+    cloud = search.particles
+    assert search.found() is None
     assert 0.5 < float(cloud.weight @ (np.hypot(cloud.x_m - 6.05, cloud.y_m - 4.05) < 3.0 * step.sd_m)) < 0.95
 
 
 def test_a_search_in_a_room_begins_there() -> None:
     outline = np.array([[0, 0], [6, 0], [6, 8], [0, 8]], float)
-    grid = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1))).grid
-    assert grid.draw(1000, np.random.default_rng(1)).x_m.max() < 6.3
+    search = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1)))
+    assert search.draw(1000).x_m.max() < 6.3
 
 
 def test_a_start_that_is_a_place_is_no_search() -> None:

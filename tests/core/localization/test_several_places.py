@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from echostep.localization import CloudSettings, Estimate, Start, TrackStatus
-from echostep.localization.cloud_estimate import Right, estimate_of
+from echostep.localization.cloud_estimate import estimate_of
 from echostep.localization.particles.cloud import cloud_about
 from echostep.particles.limits import RISK
 from echostep.plan import ANY_LEVEL, Pose
@@ -30,7 +30,7 @@ def _in_two_places(second: float, sd_m: float = 0.1, here: float = 0.9) -> Estim
     cloud.x_m = cloud.x_m + APART_M * there
     cloud.turn_rad = cloud.turn_rad + 0.5 * math.pi * there
     cloud.log_weight = np.log(np.where(there, max(second, 1e-9), 1.0 - second))
-    return estimate_of(cloud, 0.0, 0.0, 0, right=Right(here))
+    return estimate_of([(cloud, here)], 0.0, 0.0, 0)
 
 
 @pytest.mark.parametrize(("second", "x_m", "heading_rad"), [(0.4, 0.0, 0.0), (0.6, APART_M, 0.5 * math.pi)])
@@ -47,7 +47,7 @@ def test_no_place_that_has_half_of_the_weight_is_the_position() -> None:
     """Three places alike: the mean is as good as any of them."""
     cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
     cloud.x_m = cloud.x_m + APART_M * (np.arange(len(cloud.x_m)) % 3)
-    found = estimate_of(cloud, 0.0, 0.0, 0)
+    found = estimate_of([(cloud, 1.0)], 0.0, 0.0, 0)
     assert found.x_m == pytest.approx(APART_M, abs=1.0)
     assert found.status == TrackStatus.LOST
     assert len(found.hypotheses) == 3
@@ -69,7 +69,7 @@ def test_the_mean_of_two_places_is_claimed_where_it_lies_in_one(apart_m: float, 
     """Both are as likely."""
     cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))
     cloud.x_m = cloud.x_m + apart_m * (np.arange(len(cloud.x_m)) % 2)
-    found = replace(estimate_of(cloud, 0.0, 0.0, 0), status=TrackStatus.UNCERTAIN)
+    found = replace(estimate_of([(cloud, 1.0)], 0.0, 0.0, 0), status=TrackStatus.UNCERTAIN)
     assert found.x_m == pytest.approx(0.5 * apart_m, abs=0.1)
     assert found.claims_place == claimed
     assert not replace(found, status=TrackStatus.LOST).claims_place
@@ -93,4 +93,4 @@ def test_a_level_that_is_not_sure_takes_part_of_the_risk(level: int, other: floa
     cloud = cloud_about(CloudSettings(), start, 0.0, np.random.default_rng(1), SHEET)
     share = np.where(cloud.level == 0, 1.0 - other, max(other, 1e-12))
     cloud.log_weight = np.log(share / share.max())
-    assert math.isfinite(estimate_of(cloud, 0.0, 0.0, 0).protection_m) == is_finite
+    assert math.isfinite(estimate_of([(cloud, 1.0)], 0.0, 0.0, 0).protection_m) == is_finite

@@ -25,6 +25,7 @@ from echostep.localization.particles.particles import Particles
 from echostep.path import PathSegment
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import crosses_wall
+from echostep.walls.level_sheet import level_of
 
 # Assumed, not measured.
 SILENT_S = 8.0  # without a reading, while its reception is expected and others are received: the beacon is silent
@@ -107,7 +108,7 @@ class BeaconMap:
         any_heard = self.heard_s is not None and t_s - self.heard_s < SILENT_S
         if any_heard and t_s - max(self._heard_s[slot], self._unexpected_s[slot]) > SILENT_S:
             state = BeaconState.SILENT
-        level = cloud.level_at(x)
+        level = 0 if cloud.sheet is None else int(level_of(np.array([x]), cloud.sheet)[0])
         return BeaconPlace(slot, x - level * cloud.pitch_m, y, sd, axis, level, state, self._heard_s[slot])
 
     def _note_unexpected(self, cloud: Cloud, t_s: float) -> None:

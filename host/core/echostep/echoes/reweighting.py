@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import SURE_COS, EchoModel, outlier_density, planned_density
-from echostep.jit import inline_part, kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
 from echostep.particles.kernels import (
     SegmentArrays,
@@ -31,19 +31,6 @@ from echostep.walls.index import WallIndex
 NEGLIGIBLE_WEIGHT = 1e-9
 LEAST_TOP = 1e-100  # greatest weight below which all are rescaled: far from the least number
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
-
-
-class WeightedPing(NamedTuple):
-    """One ping of a `PingBatch`."""
-
-    axis_rad: float
-    range_m: float
-    power: float
-    travel_m: float
-    stray: float
-    missed: float
-    alike: float
-    unplanned: float
 
 
 class EchoMemory(NamedTuple):
@@ -92,7 +79,7 @@ def propagate_and_reweight(
             done = until
         if k < len(pings.share):
             memory.log_evidence[k], size, top = reweight_by_ping(
-                particles, arrays, memory.hidden[pings.ranger[k]], ping_of(pings, k), model.echo, top, walls, sources
+                particles, arrays, memory.hidden[pings.ranger[k]], pings, k, model.echo, top, walls, sources
             )
             k += 1
         else:
@@ -107,27 +94,12 @@ def propagate_and_reweight(
     return MoveProgress(done, k), math.log(lowest), passed
 
 
-@inline_part
-def ping_of(pings: PingBatch, k: int) -> WeightedPing:
-    """The k-th ping of a batch."""
-    return WeightedPing(
-        pings.axis_rad[k],
-        pings.range_m[k],
-        pings.power[k],
-        pings.travel_m[k],
-        pings.stray[k],
-        pings.missed[k],
-        pings.alike[k],
-        pings.unplanned[k],
-    )
-
-
 @lean_kernel
 def reweight_by_ping(
-    particles: ParticleArrays, arrays: SegmentArrays, hidden: Floats, ping: WeightedPing, model: EchoModel, top: float,
+    particles: ParticleArrays, arrays: SegmentArrays, hidden: Floats, pings: PingBatch, k: int, model: EchoModel, top: float,
     walls: WallIndex, sources: SourceList,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Multiply each particle's weight by its likelihood of a ping; `top`: the greatest weight before.
+    """Multiply each particle's weight by its likelihood of the k-th ping; `top`: the greatest weight before.
 
     `hidden` (n,): of this ranger, the probability that the particle's view is hidden, so that the plan gives no information. Along the path it
     returns to `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors
@@ -137,10 +109,12 @@ def reweight_by_ping(
     x, y, turn, _, _ = particles
     weight, cos, sin = arrays
     distance_m, off_axis_rad, kind = sources
-    ax, ay = math.cos(ping.axis_rad), math.sin(ping.axis_rad)
-    persists = math.exp(-ping.travel_m / model.hidden_m)
-    outlier = model.outlier * (outlier_density(ping.range_m, model) + ping.missed) ** ping.power
-    strays = 0.5 * (ping.alike + 1.0 / (model.maximum_m - model.minimum_m))
+    axis_rad, range_m, power = pings.axis_rad[k], pings.range_m[k], pings.power[k]
+    stray, missed, unplanned = pings.stray[k], pings.missed[k], pings.unplanned[k]
+    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
+    persists = math.exp(-pings.travel_m[k] / model.hidden_m)
+    outlier = model.outlier * (outlier_density(range_m, model) + missed) ** power
+    strays = 0.5 * (pings.alike[k] + 1.0 / (model.maximum_m - model.minimum_m))
     limits = Limits(model.sure_m, SURE_COS, model.edge_m)
     least, best = NEGLIGIBLE_WEIGHT * top, 0.0
     total_before, total, squares = 0.0, 0.0, 0.0
@@ -149,12 +123,12 @@ def reweight_by_ping(
         if w < least:
             continue
         receiver = Receiver(x[i], y[i], ax * cos[i] - ay * sin[i], ax * sin[i] + ay * cos[i])
-        count = first_sources(receiver, ping.axis_rad + turn[i], walls, limits, sources)
-        density = planned_density(ping.range_m, count, distance_m, off_axis_rad, kind, ping.stray, strays, model)
-        density += ping.missed
-        planned = (1.0 - model.outlier) * math.exp(ping.power * math.log(max(density, LEAST_DENSITY))) + outlier
+        count = first_sources(receiver, axis_rad + turn[i], walls, limits, sources)
+        density = planned_density(range_m, count, distance_m, off_axis_rad, kind, stray, strays, model)
+        density += missed
+        planned = (1.0 - model.outlier) * math.exp(power * math.log(max(density, LEAST_DENSITY))) + outlier
         before = model.hidden + persists * (hidden[i] - model.hidden)
-        by_hidden = before * ping.unplanned
+        by_hidden = before * unplanned
         likelihood = by_hidden + (1.0 - before) * planned
         hidden[i] = by_hidden / likelihood
         total_before += w

@@ -17,7 +17,6 @@ import numpy as np
 
 from echostep.height.levels import HeightChange
 from echostep.localization.grid.search import Search
-from echostep.localization.grid.search_grid import SearchGrid
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.settings import UNPLANNED_DOOR
 from echostep.particles.arrays import Move
@@ -52,7 +51,7 @@ class CloudHypothesis:
 
     cloud: Cloud | Search
     log_weight: float
-    table: SearchGrid | None = None
+    table: Search | None = None
     doubts: dict[str, float] = field(default_factory=dict)
 
     def weigh(self, log_pings: float, log_passed: float) -> None:
@@ -61,9 +60,8 @@ class CloudHypothesis:
 
     def change_levels(self, move: Move, change: HeightChange) -> float:
         """Update heights and levels after a move; returns the log of the mean factor of the weights."""
-        before = self.cloud.lag_variance
         if self.table is not None:
-            self.table.change_levels(change, before)
+            self.table.change_levels(move, change)
         return self.cloud.change_levels(move, change)
 
 
@@ -110,6 +108,11 @@ class Belief:
     def clouds(self) -> list[CloudHypothesis]:
         """The hypotheses that have a cloud."""
         return [self.tracked] if self.search is None else [self.tracked, self.search]
+
+    @property
+    def parts(self) -> list[Cloud | Search]:
+        """The clouds, and the table of one that has one."""
+        return [part for each in self.clouds for part in (each.cloud, each.table) if part is not None]
 
     @property
     def plan_fits(self) -> float:

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The estimate of a cloud: its moments, and how likely small errors are.
 
-In: the tracked cloud, a search's cloud, the probability of each. Out: `Estimate`. Owns nothing.
+In: clouds, the probability of each. Out: `Estimate`. Owns nothing.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -87,70 +88,67 @@ def _within(left_m: float, sd_m: float) -> float:
     return 1.0 if sd_m <= 0.0 else 1.0 - math.exp(-0.5 * (left_m / sd_m) ** 2)
 
 
-class Right(NamedTuple):
-    """Probability that the trunk is in the tracked cloud, `here`, and in a search's cloud."""
-
-    here: float
-    search: float = 0.0
-
-
-SURELY = Right(1.0)
+# The tracked cloud and its rivals, each with the probability that the trunk is in it
+Mixture = Sequence[tuple[Particles, float]]
 
 
 def estimate_of(
-    cloud: Particles, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, right: Right = SURELY,
-    elsewhere: Elsewhere | None = None, search: Particles | None = None, map_sd_m: float = 0.0,
+    mixture: Mixture, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, map_sd_m: float = 0.0,
+    elsewhere: Elsewhere | None = None, height: tuple[float, float] | None = None, plan_fits: float = 1.0, outside: float = 0.0,
 ) -> Estimate:  # fmt: skip
-    """Weighted moments of the cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are.
+    """Weighted moments of the tracked cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are by all clouds.
 
     The mean of a cloud with several likely places may lie in none of them: the position is then the likeliest place, if it has more than
-    half of the weight, and MUCH_LIKELIER times the weight near the mean. `sd_m`: standard deviation per axis to add; `right`: probability that the
-    cloud is right, otherwise the trunk is `elsewhere`. While tracking, the covariance is the cloud's; otherwise the covariance of the mixture of both
-    about the position. The hypotheses come from `search`, if given. `map_sd_m`: standard deviation per axis of the map itself there, as a drawing
-    states it; it is part of `sd_m`, and makes small errors less likely.
+    half of the weight, and MUCH_LIKELIER times the weight near the mean. `sd_m`: standard deviation per axis to add. While tracking, the covariance
+    is the cloud's; otherwise that of the mixture with `elsewhere`, where the trunk is if all clouds are wrong, about the position. `map_sd_m`:
+    standard deviation per axis of the map itself there, as a drawing states it; it is part of `sd_m`, and makes small errors less likely.
+    `height`: mean and standard deviation (m), if not the cloud's.
     """
-    weight = cloud.weight
-    levels, z, z_sd = _heights(cloud, weight)
+    (cloud, right), *rivals = mixture
+    weight, shares = cloud.weight, _shares(mixture)
+    levels = tuple((shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
+    z = float(weight @ cloud.z_m)
+    height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
     m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
     places: tuple[LikelyPlace, ...] = ()
-    if search is not None or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED:
-        places = (
-            cloud.places(walk_heading_rad) if search is None else places_of_both(cloud, search, right, walk_heading_rad)
-        )
-    if search is None and places and places[0].probability > PROBABLE:
+    if rivals or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED:
+        places = _places(mixture, shares, walk_heading_rad)
+    if not rivals and places and places[0].probability > PROBABLE:
         m = _moments_at(places[0], m, cloud, weight)
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     limits_m = (TRACKING_M, LOST_M)
     if map_sd_m > 0.0:
         near, about = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, weight, (x, y, z), limits_m, map_sd_m)
-    near, about = right.here * near, right.here * about
-    is_right = right.here
-    if search is not None:
-        beside = weight_about(search.map_x_m, search.y_m, search.z_m, search.weight, (x, y, z), limits_m, map_sd_m)
-        near, about = near + right.search * beside[0], about + right.search * beside[1]
-        levels = _levels_of_both(levels, _heights(search, search.weight)[0], right)
-        is_right = min(right.here + right.search * beside[0], 1.0)
+    near, about = right * near, right * about
+    for each, probability in rivals:
+        beside = weight_about(each.map_x_m, each.y_m, each.z_m, each.weight, (x, y, z), limits_m, map_sd_m)
+        near, about = near + probability * beside[0], about + probability * beside[1]
+        right = min(right + probability * beside[0], 1.0)
     status = _status(near, about, max(levels))
     xx, yy = xx + sd_m**2, yy + sd_m**2
-    protection_m = _protection_m(xx, xy, yy, is_right * max(levels))
+    protection_m = _protection_m(xx, xy, yy, right * max(levels))
     if status is not TrackStatus.TRACKING and elsewhere is not None:
-        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), is_right)
+        xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), right)
     return Estimate(
-        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, z, z_sd,
-        protection_m, is_right, places,
+        t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, *height,
+        protection_m, right, places, plan_fits, outside,
     )  # fmt: skip
 
 
-def places_of_both(
-    cloud: Particles, search: Particles, right: Right, walk_heading_rad: float
-) -> tuple[LikelyPlace, ...]:
-    """The likely places of the tracked cloud and of a search, if the trunk is in one of them."""
-    both = (cloud, search)
-    weight = np.concatenate([cloud.weight * right.here, search.weight * right.search])
-    x, y, turn = (np.concatenate([getattr(each, name) for each in both]) for name in ("map_x_m", "y_m", "turn_rad"))
-    level = np.concatenate([each.level for each in both])
-    return hypotheses(x, y, level, turn + walk_heading_rad, weight / weight.sum())
+def _shares(mixture: Mixture) -> Floats:
+    """Probability (n,) of each cloud, if the trunk is in one of them."""
+    probability = np.array([probability for _, probability in mixture])
+    return probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
+
+
+def _places(mixture: Mixture, shares: Floats, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+    """The likely places of the trunk, if it is in one of the clouds."""
+    each = [
+        (cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, share * cloud.weight)
+        for (cloud, _), share in zip(mixture, shares, strict=True)
+    ]
+    return hypotheses(*map(np.concatenate, zip(*each, strict=True)))
 
 
 def _moments_at(place: LikelyPlace, mean: Moments, cloud: Particles, weight: Floats) -> Moments:
@@ -201,18 +199,3 @@ class Elsewhere(NamedTuple):
         away = (self.xx_m2 + dx * dx, self.xy_m2 + dx * dy, self.yy_m2 + dy * dy)
         xx, xy, yy = (right * c + (1.0 - right) * a for c, a in zip(covariance_m2, away, strict=True))
         return xx, xy, yy
-
-
-def _levels_of_both(one: tuple[float, ...], other: tuple[float, ...], right: Right) -> tuple[float, ...]:
-    """Probability of each level, if the trunk is in one of the two clouds."""
-    both = [right.here * a + right.search * b for a, b in zip(one, other, strict=True)]
-    return tuple(p / sum(both) for p in both)
-
-
-def _heights(cloud: Particles, weight: Floats) -> tuple[tuple[float, ...], float, float]:
-    """Probability of each level; mean and standard deviation of the height."""
-    if cloud.sheet is None:
-        return (1.0,), 0.0, 0.0
-    share = np.bincount(cloud.level, weight, len(cloud.sheet.height_m))
-    z = float(weight @ cloud.z_m)
-    return tuple(share.tolist()), z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2))

@@ -20,13 +20,14 @@ from echostep.height.height_filter import RelativeHeight, RidingHeight
 from echostep.height.levels import Air, HeightChange
 from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
-from echostep.localization.cloud_estimate import Right, estimate_of, weight_about
+from echostep.localization.cloud_estimate import estimate_of, weight_about
 from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
 from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
+from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
 from echostep.localization.unmeasured import UnmeasuredWay
@@ -87,7 +88,7 @@ class MapFilter:
 
     def stated(self, t_s: float, walk_heading_rad: float, step: int) -> Estimate:
         """The estimate at a start that has just been stated."""
-        return estimate_of(self.cloud, t_s, walk_heading_rad, step, 0.0, Right(STATED))
+        return estimate_of([(self.cloud, STATED)], t_s, walk_heading_rad, step)
 
     @property
     def echo(self) -> EchoSettings:
@@ -108,9 +109,9 @@ class MapFilter:
         return self._pings.odometer
 
     @property
-    def cloud(self) -> Cloud | Search:
-        """The cloud that is tracked, or the search if there is none."""
-        return self.belief.tracked.cloud
+    def cloud(self) -> Particles:
+        """The particles of the cloud that is tracked, or of the search if there is none."""
+        return self.belief.tracked.cloud.particles
 
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
@@ -146,8 +147,8 @@ class MapFilter:
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
-        for each in self.belief.clouds:
-            each.cloud.turn_walk_frame(by_rad)
+        for part in self.belief.parts:
+            part.turn_walk_frame(by_rad)
         self._way.clear()
 
     def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud | Search:
@@ -161,8 +162,7 @@ class MapFilter:
     def _search_from(self, start: Start, walk_heading_rad: float) -> Search:
         """A search on the floor, which there is."""
         s, b = self._settings, self.building
-        grid = grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s)
-        return Search(grid, start, s.cloud, self._rng, b.sheet, s.climb)
+        return grid_of(start, walk_heading_rad, *self._table(), b.floor, b.sheet, s, self._rng)
 
     def _table(self) -> tuple[GridCells, RangeMemory]:
         """The cells of a grid, and the density of pings without a plan that is as inexact as the cells."""
@@ -179,7 +179,7 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
-        if self.cloud.is_searching or not len(self.building.floor.x_m):
+        if self.belief.tracked.cloud.is_searching or not len(self.building.floor.x_m):
             return
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
@@ -190,7 +190,7 @@ class MapFilter:
         """Search the building along the last metres of the path."""
         search = self._search_from(start, walk_heading_rad)
         self.belief.begin_search(search, self._way.search(search, self._model))
-        if isinstance(self.cloud, Cloud):
+        if not self.belief.tracked.cloud.is_searching:
             self.belief.tracked.table = grid_about(
                 self.cloud, *self._table(), self.building.floor, self._settings, self._rng
             )
@@ -200,11 +200,11 @@ class MapFilter:
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         if anew:
             self._barometer_starts = measured.barometer_starts
-        for each in self.belief.clouds:
+        for part in self.belief.parts:
             if anew:
-                each.cloud.forget_lag()
+                part.forget_lag()
             else:
-                each.cloud.let_lag_drift(self._gaps.pause_s)
+                part.let_lag_drift(self._gaps.pause_s)
         if anew:
             self._riding.forget()
             if self._height is not None:
@@ -262,14 +262,11 @@ class MapFilter:
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self.building.has_walls:
-            log_ratio = float(unplanned.counts @ (evidence.log_pings - alone))
-            each.weigh(share * log_ratio, self._passed(move, evidence.log_path))
-
-    def _passed(self, move: Move, log_passed: float) -> float:
-        """The part that counts of the log of a cloud's share that crossed no wall."""
-        if self.belief.search is not None:
-            return log_passed
-        return self._crossed.charge(self._believed(0.0), math.hypot(move.dx_m, move.dy_m), log_passed)
+            log_ratio, log_passed = float(unplanned.counts @ (evidence.log_pings - alone)), evidence.log_path
+            if self.belief.search is None:
+                path_m = math.hypot(move.dx_m, move.dy_m)
+                log_passed = self._crossed.charge(self._believed(0.0), path_m, log_passed)
+            each.weigh(share * log_ratio, log_passed)
 
     def _compare(self, segment: PathSegment, move: Move, pings: PingBatch) -> None:
         """Update the belief after a move: end improbable clouds, and merge clouds in one place; learn the bias where the likeliest is."""
@@ -282,21 +279,22 @@ class MapFilter:
         if self._is_found_here():
             belief.merge()
         if len(pings.share) and belief.right > PROBABLE:  # bounded by its prior
-            self._bias.learn_behind(self.cloud.arrays, self.cloud.weight, move, pings, self.building.walls, self._model)
+            cloud = self.cloud
+            self._bias.learn_behind(cloud.arrays, cloud.weight, move, pings, self.building.walls, self._model)
 
     def _is_found_here(self) -> bool:
         """Whether a search has found the place of the tracked cloud."""
         if self.belief.search is None or self.belief.search.cloud.is_searching:
             return False
-        cloud, mean = self.belief.search.cloud, self._believed(0.0)
+        cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
         place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
         near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
         return near > PROBABLE
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
-        cloud, weight = self.cloud, self.cloud.weight
-        level = cloud.likeliest_level
+        cloud = self.cloud
+        weight, level = cloud.weight, int(cloud.level_shares.argmax())
         on = cloud.level == level
         x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
         return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
@@ -304,27 +302,15 @@ class MapFilter:
     def _estimate(self, segment: PathSegment) -> Estimate:
         """The estimate at the end of a segment."""
         belief = self.belief
-        hidden_sd_m = HIDDEN_SD_M * self.cloud.hidden_share
-        map_sd_m = self._map_sd_m()
-        sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         stood = 1.0 - self._unmeasured.probability
-        right = Right(stood * belief.right, stood * belief.probability(belief.search))
-        search = belief.search.cloud if belief.search else None
-        new = estimate_of(
-            self.cloud, segment.t1_s, segment.heading1_rad, segment.step, sd_m, right, self.building.elsewhere, search,
-            map_sd_m,
+        mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.clouds]
+        cloud, _ = mixture[0]
+        hidden_sd_m = HIDDEN_SD_M * cloud.hidden_share
+        at, drawn = self._believed(0.0), self.building.drawn
+        map_sd_m = drawn.sd_m(at.x_m, at.y_m, at.level)
+        sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
+        return estimate_of(
+            mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
+            None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
+            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight),
         )  # fmt: skip
-        if self._height is not None:
-            new = replace(new, z_m=self._height.height_m, z_sd_m=self._height.sd_m)
-        return replace(
-            new,
-            plan_fits=belief.plan_fits,
-            outside=self.building.weight_outside(self.cloud.x_m, self.cloud.y_m, self.cloud.weight),
-        )
-
-    def _map_sd_m(self) -> float:
-        """Standard deviation per axis of a drawing where the tracked cloud is; 0 on other plans."""
-        if not self.building.drawn.are_stated:
-            return 0.0
-        at = self._believed(0.0)
-        return self.building.drawn.sd_m(at.x_m, at.y_m, at.level)

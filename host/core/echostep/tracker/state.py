@@ -6,8 +6,9 @@ In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothin
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from echostep.aiding import MeetingNews
 from echostep.arrays import Floats, Ints
@@ -17,6 +18,7 @@ from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
 from echostep.localization import Estimate, MapFilter
 from echostep.odometry import Alarm, FrontEndCounts
+from echostep.particles.kernels import systematic
 from echostep.path import PathSegment
 from echostep.ports.people.team_beacons import SharedBeacon
 from echostep.xsens.reader import MtxCounts
@@ -91,8 +93,9 @@ class ParticleSnapshot:
 
     @classmethod
     def of(cls, tracked: MapFilter, most: int) -> ParticleSnapshot:
-        """A copy of at most `most` particles of the tracked cloud, evenly thinned."""
-        cloud = tracked.cloud
-        every = slice(None, None, max(1, math.ceil(len(cloud.x_m) / most)))
-        x_m, y_m, log_weight = (each[every].copy() for each in (cloud.map_x_m, cloud.y_m, cloud.log_weight))
-        return cls(x_m, y_m, cloud.level[every].copy(), log_weight)
+        """A copy of the particles of the tracked cloud; `most` by weight, if there are more."""
+        cloud, log_weight = tracked.cloud, tracked.cloud.log_weight.copy()
+        if len(log_weight) <= most:
+            return cls(cloud.map_x_m.copy(), cloud.y_m.copy(), cloud.level.copy(), log_weight)
+        chosen = systematic(cloud.weight, 0.5, most)
+        return cls(cloud.map_x_m[chosen], cloud.y_m[chosen], cloud.level[chosen], np.zeros(most))

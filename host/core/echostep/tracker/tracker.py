@@ -148,7 +148,7 @@ class Tracker:
         )
 
     def particles(self, most: int) -> ParticleSnapshot | None:
-        """A copy of at most `most` particles, evenly thinned; None before the first segment."""
+        """A copy of at most `most` particles, by weight; None before the first segment."""
         return None if self.filter is None else ParticleSnapshot.of(self.filter, most)
 
     def beacon_places(self, t_s: float) -> list[BeaconPlace]:

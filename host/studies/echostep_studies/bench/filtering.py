@@ -74,8 +74,7 @@ def track(segments: Sequence[MeasuredSegment], plan: Plan, start: Start, seed: i
         estimate = map_filter.update(segment)
         cpu_s += time.process_time() - begin_s
         claims.append(_claim(estimate))
-        searching = 0 if map_filter.belief.search is None else len(map_filter.belief.search.cloud.x_m)
-        most = max(most, len(map_filter.cloud.x_m) + searching)
+        most = max(most, sum(len(each.cloud.particles.x_m) for each in map_filter.belief.clouds))
     return FilterRun(tuple(claims), most, cpu_s)
 
 

@@ -63,7 +63,7 @@ BUILDING = building()
 
 def filter_at(x_m: float, y_m: float, right: float) -> AidedFilter:
     made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.cloud, right, 1.0)
+    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
     return made
 
 
@@ -210,7 +210,7 @@ def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
 
 def test_an_unknown_start_is_found_by_a_meeting() -> None:
     lost = AidedFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
-    assert lost.cloud.is_searching
+    assert lost.belief.is_searching
     assert lost.meet(FAR) is MeetingEffect.USED
     near = np.hypot(lost.cloud.map_x_m - 20.0, lost.cloud.y_m - 2.0) < 2.5
     assert float(lost.cloud.weight @ near) > 0.95

@@ -35,7 +35,7 @@ def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
 
 def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> AidedFilter:
     made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.cloud, right, 1.0)
+    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
     return made
 
 
@@ -87,7 +87,7 @@ def test_ranges_that_fit_take_back_doubt_and_give_nothing_more() -> None:
 def test_a_search_is_narrowed_by_ranges_of_two_beacons_that_it_fits_badly_at_first() -> None:
     """Of a whole building, a short range leaves a small ring: less than chance explains, and yet the ring."""
     lost = AidedFilter(BUILDING, Start(), 0.0, np.random.default_rng(4))
-    assert lost.cloud.is_searching
+    assert lost.belief.is_searching
     for range_m, number in ((0.5, 7), (0.5, 8)):
         lost.meet(a_range(range_m, number))
     near = np.hypot(lost.cloud.map_x_m - 4.0, lost.cloud.y_m - 7.5) < 2.0

@@ -115,8 +115,8 @@ def test_the_effective_size() -> None:
 def test_walls_take_the_weight_and_the_rest_carries_on() -> None:
     found = cloud()
     found.propagate_and_reweight(Move(0.0, 0.9, 0.1, 0.0), NOTHING, MODEL, BOX)  # up to the wall at y = 2
-    assert estimate_of(found, 0.0, 0.0, 0).y_m < 2.0
-    assert estimate_of(found, 0.0, 0.0, 0).ellipse95.major_m < 1.0
+    assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).y_m < 2.0
+    assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).ellipse95.major_m < 1.0
 
 
 @pytest.mark.parametrize(("bend_m", "passes"), [(0.83, True), (0.0, False)])
@@ -148,7 +148,7 @@ def test_a_move_through_a_wall_is_survived_wider() -> None:
     found = cloud()
     found.x_m[:], found.y_m[:], found.turn_rad[:] = 1.0, 1.0, 0.0
     found.propagate_and_reweight(Move(0.0, 3.0, 0.01, 0.0), NOTHING, MODEL, BOX)
-    assert estimate_of(found, 0.0, 0.0, 0).ellipse95.major_m > 1.0
+    assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).ellipse95.major_m > 1.0
 
 
 def test_echoes_find_the_place_across_a_corridor() -> None:
@@ -156,7 +156,7 @@ def test_echoes_find_the_place_across_a_corridor() -> None:
     for _ in range(30):
         for axis, range_m in ((math.pi / 2, 0.7), (-math.pi / 2, 1.3)):  # the left wall is 0.7 m away: y = 1.3
             explained = found.propagate_and_reweight(Move(0.0, 0.0, 0.0, 0.0), heard(axis, range_m), MODEL, BOX)
-    assert estimate_of(found, 0.0, 0.0, 0).y_m == pytest.approx(1.3, abs=0.05)
+    assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).y_m == pytest.approx(1.3, abs=0.05)
     assert explained[0] > 0.3 * 1.0  # the power of the pings
 
 
@@ -181,7 +181,7 @@ def test_pings_count_where_they_were_triggered() -> None:
             np.full(10, UNPLANNED),
         )
         found.propagate_and_reweight(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
-        ends[name] = estimate_of(found, 0.0, 0.0, 0).x_m
+        ends[name] = estimate_of([(found, 1.0)], 0.0, 0.0, 0).x_m
     assert ends["passed"] > ends["not yet"] + 0.2
 
 
@@ -189,7 +189,7 @@ def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
     found = cloud(300)
     found.scatter(Move(0.0, 0.0, 6.0, 3.0))
     assert len(found.x_m) == CloudSettings().largest
-    assert estimate_of(found, 0.0, 0.0, 0).status == TrackStatus.LOST
+    assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).status == TrackStatus.LOST
     found.x_m[:] = 1.0 + 0.02 * np.random.default_rng(3).standard_normal(len(found.y_m))
     found.y_m[:] = 1.0 + 0.1 * np.random.default_rng(2).standard_normal(len(found.y_m))
     found.turn_rad[:] = 0.0

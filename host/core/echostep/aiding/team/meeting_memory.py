@@ -88,18 +88,13 @@ class MeetingMemory:
         return len(self._contradicted_m)
 
 
-def moved_probability(here: float, meeting: Meeting, count: int) -> float:
-    """Probability that the meeting is right where `count` meetings contradict a cloud that is right with probability `here`.
+def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
+    """Probability of the teammate's place where `count` contradictions move the cloud there, else None. `here`: probability that it is right.
 
     If the cloud is right, all of them are wrong: odds of here * wrong^count; otherwise this one is right with 1 - wrong.
     """
     wrong = WRONG[meeting.status]
-    return (1.0 - here) * (1.0 - wrong) / (here * wrong**count + 1.0 - here)
-
-
-def moved_by(meeting: Meeting, here: float, count: int) -> float | None:
-    """Probability of the teammate's place where `count` contradictions move the cloud there, else None. `here`: probability that it is right."""
-    moved = moved_probability(here, meeting, count)
+    moved = (1.0 - here) * (1.0 - wrong) / (here * wrong**count + 1.0 - here)
     is_alone = count < CONTRADICTIONS and here >= PROBABLE
     return None if (meeting.range_m or 0.0) > PLACE_M or is_alone or moved < PROBABLE else moved
 

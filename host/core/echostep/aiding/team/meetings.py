@@ -30,6 +30,7 @@ from echostep.arrays import Bools, Floats
 from echostep.localization.belief import CloudHypothesis
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.cloud import Cloud
+from echostep.localization.particles.particles import Particles
 from echostep.particles.limits import HALF_STOREY_M, PROBABLE
 
 # Assumed, not measured.
@@ -78,7 +79,7 @@ def best_omega(own: Floats, other: Floats) -> float:
     return min(max((2.0 * b - c) / (2.0 * curvature), 0.0), 1.0)
 
 
-def places_at(cloud: Cloud | Search, meeting: Meeting) -> Floats:
+def places_at(cloud: Particles, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
     place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
     c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
@@ -89,15 +90,14 @@ def places_at(cloud: Cloud | Search, meeting: Meeting) -> Floats:
 
 def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
-    if isinstance(cloud, Search):
-        cloud.show_every_state()
-    place = places_at(cloud, meeting)
+    particles = cloud.states
+    place = places_at(particles, meeting)
     if cloud.sheet is None:
         on_level, levels = np.full(len(place), meeting.level == 0), 1
     else:
         heights = cloud.sheet.height_m
-        on_level, levels = np.abs(cloud.z_m - heights[meeting.level]) < HALF_STOREY_M, len(heights)
-    log_met, weight = log_density(meeting, place, on_level, levels), cloud.weight
+        on_level, levels = np.abs(particles.z_m - heights[meeting.level]) < HALF_STOREY_M, len(heights)
+    log_met, weight = log_density(meeting, place, on_level, levels), particles.weight
     wrong = WRONG[meeting.status]
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
@@ -142,20 +142,15 @@ def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     return variance
 
 
-def weigh_range(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
-    """Weigh the cloud by a range to a teammate's beacon; returns the probability that the range is right, given the cloud.
+def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
+    """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud.
 
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
     """
     right = weigh(each.cloud, meeting, area_m2)
-    if not each.cloud.is_searching:
+    if meeting.beacon is not None and not each.cloud.is_searching:
         before = each.doubts.get(meeting.name, 0.0)
         after = before + meeting.share * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
         each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)
         each.log_weight += each.doubts[meeting.name] - before
     return right
-
-
-def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
-    """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud."""
-    return weigh(each.cloud, meeting, area_m2) if meeting.beacon is None else weigh_range(each, meeting, area_m2)

@@ -60,7 +60,7 @@ class GridHeights:
             z_m[c, to], lag_m[to] = z, lag
         self._z_m = z_m
         gain = lag_variance / variance if math.isfinite(variance) else 0.0
-        if not self._is_climbing(change):
+        if math.isinf(change.felt_sd_m) or abs(change.felt_m) <= 2.0 * model.flat_sd_m:
             innovation_m = change.height_m - sheet.height_m - lag_m
             lag_m += np.where(innovation_m**2 < THREE_SD2 * variance, gain * innovation_m, 0.0)
         self._lag_m = lag_m
@@ -71,6 +71,3 @@ class GridHeights:
         """Heights and offsets (n,) on these levels, in these connectors."""
         z_m = np.vstack([self._sheet.height_m, self._z_m])
         return z_m[connector + 1, level], self._lag_m[level]
-
-    def _is_climbing(self, change: HeightChange) -> bool:
-        return math.isfinite(change.felt_sd_m) and abs(change.felt_m) > 2.0 * self._model.flat_sd_m

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The grid of an unknown start: evenly over the floor, and about a place if one is given.
 
-In: a `Start`, the cells of the building, its floor. Out: a `SearchGrid`. Owns nothing. The weight of each state is computed, none is drawn.
+In: a `Start`, the cells of the building, its floor. Out: a `Search`. Owns nothing. The weight of each state is computed, none is drawn.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ from echostep.arrays import Floats
 from echostep.echoes.range_table import SECTORS
 from echostep.echoes.unplanned import RangeMemory
 from echostep.localization.grid.cells import GridCells
-from echostep.localization.grid.heights import GridHeights
-from echostep.localization.grid.search_grid import SearchGrid
-from echostep.localization.particles.cloud import Cloud
+from echostep.localization.grid.search import Search
+from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.start import STATED, TURN_AROUND_RAD, Start, allowed_floor
 from echostep.localization.settings import FilterSettings
 from echostep.particles.kernels import systematic
@@ -35,11 +34,10 @@ def is_unknown(start: Start) -> bool:
 
 
 def grid_about(
-    cloud: Cloud, cells: GridCells, unplanned: RangeMemory, floor: Floor, settings: FilterSettings, rng: np.random.Generator
-) -> SearchGrid:  # fmt: skip
+    cloud: Particles, cells: GridCells, unplanned: RangeMemory, floor: Floor, settings: FilterSettings, rng: np.random.Generator
+) -> Search:  # fmt: skip
     """The grid of a cloud's poses, by which the cloud is compared with a search as long as the search is on a grid."""
-    heights = None if cloud.sheet is None else GridHeights(cloud.sheet, settings.climb, Start(air=cloud.air))
-    grid = SearchGrid(cells, (floor.x_m, floor.y_m), unplanned, heights)
+    grid = Search(cells, (floor.x_m, floor.y_m), unplanned, Start(air=cloud.air), cloud.sheet, settings, rng)
     chosen = systematic(cloud.weight, float(rng.random()), len(cloud.x_m))
     grid.begin_about(cloud.x_m[chosen], cloud.y_m[chosen], cloud.turn_rad[chosen], 1.0)
     return grid
@@ -47,12 +45,11 @@ def grid_about(
 
 def grid_of(
     start: Start, walk_heading_rad: float, cells: GridCells, unplanned: RangeMemory, floor: Floor, sheet: LevelSheet | None,
-    settings: FilterSettings,
-) -> SearchGrid:  # fmt: skip
+    settings: FilterSettings, rng: np.random.Generator,
+) -> Search:  # fmt: skip
     """The grid of an unknown start. `walk_heading_rad`: the trunk's heading in the walk frame at the start."""
     allowed = allowed_floor(floor, start, sheet)
-    heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
-    grid = SearchGrid(cells, (allowed.x_m, allowed.y_m), unplanned, heights)
+    grid = Search(cells, (allowed.x_m, allowed.y_m), unplanned, start, sheet, settings, rng)
     about = start.pose or start.near
     if about is not None:
         facing = _facing(about.heading_rad - walk_heading_rad, start.heading_sd_rad)

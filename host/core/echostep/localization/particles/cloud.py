@@ -31,7 +31,7 @@ from echostep.height.levels import (
     set_levels_by_pressure,
 )
 from echostep.localization.particles.particles import GATHERED_REST, Particles
-from echostep.localization.particles.sampling import kld_size, log_mode_weight, spread_evenly
+from echostep.localization.particles.sampling import kld_size, log_mode_weight
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
 from echostep.particles.arrays import DrawnPoses, Move, PingBatch
@@ -70,7 +70,7 @@ def cloud_about(
     z_m = sheet.height_m[level_of(x_m, sheet)] if sheet else np.zeros(len(x_m))
     lag_m = np.full(len(x_m), 0.0 if start.air is None else start.air.zero_m)
     poses = DrawnPoses(x_m, y_m, heading - walk_heading_rad, z_m, lag_m)
-    cloud = Cloud(poses, settings, rng, sheet, climbing or ClimbSettings(), start.lag_variance)
+    cloud = Cloud(poses, settings, rng, sheet, start.lag_variance, climbing or ClimbSettings())
     cloud.shrink(log_weight)
     return cloud
 
@@ -86,6 +86,22 @@ class Cloud(Particles):
     is_searching: ClassVar[bool] = False
 
     is_gathered, is_on_any_level = False, False
+
+    def __init__(
+        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
+        lag_variance: float, climbing: ClimbSettings,
+    ) -> None:  # fmt: skip
+        """`sheet`: of several levels, or None. `lag_variance`: in m2."""
+        super().__init__(poses, np.zeros(len(poses.x_m)), sheet, lag_variance, climbing)
+        self._settings, self._rng = settings, rng
+        self.scale += settings.start_scale_sd * rng.standard_normal(len(self.scale))
+
+    @property
+    def particles(self) -> Particles:
+        """The cloud: a search has to make its particles."""
+        return self
+
+    states = particles
 
     def shrink(self, log_weight: Floats) -> None:
         """Keep as many of the first particles, which were drawn with these log-weights (n,), as a start needs."""
@@ -129,8 +145,9 @@ class Cloud(Particles):
                 self.arrays, move, noise, progress, pings, cloud_model, index, EchoMemory(self.hidden, log_evidence)
             )
             log_passed += passed
-            if lowest < -0.5 * settings.wall_cost:
-                self._widen()
+            if lowest < -0.5 * settings.wall_cost:  # every particle has crossed a wall
+                self.x_m += settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
+                self.y_m += settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
             self.resample_if_needed(index)
         return Evidence(log_evidence, log_passed)
 
@@ -156,7 +173,9 @@ class Cloud(Particles):
         settings = self._settings
         self._settings = replace(settings, largest=min(PASSING, settings.largest))
         levels = len(self.sheet.height_m) if self.sheet else 1
-        log_weight, chosen = self.log_weight, spread_evenly(len(self.x_m), max(PASSING // levels, 1))
+        # Evenly: in a cloud that is not gathered, light places have more particles than by their weight
+        chosen = np.unique(np.linspace(0, len(self.x_m) - 1, max(PASSING // levels, 1)).astype(np.int64))
+        log_weight = self.log_weight
         self.keep(chosen)
         self.log_weight = log_weight[chosen]
         self._roughen(*PASSING_ROUGH)
@@ -248,11 +267,6 @@ class Cloud(Particles):
         """Draw the bend of each particle's path on a move, relative to the bend of BENT of an arc."""
         turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
         self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
-
-    def _widen(self) -> None:
-        """Widen the places after every particle has crossed a wall."""
-        self.x_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
-        self.y_m += self._settings.rescue_sd_m * self._rng.standard_normal(len(self.x_m))
 
     def _roughen(self, rough_m: float, rough_rad: float, walls: WallIndex = NO_WALLS) -> None:
         """Add noise to a scattered cloud, so that copies of one particle try places between the few that fit [Gordon et al. 1993]."""

@@ -12,8 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
-from echostep.localization.particles.places import LikelyPlace, hypotheses
-from echostep.localization.settings import CloudSettings
+from echostep.localization.particles.places import hypotheses
 from echostep.particles.arrays import DrawnPoses, ParticleArrays
 from echostep.particles.limits import ROOM_M
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -22,49 +21,11 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 GATHERED_REST = 1e-4
 
 
-class Particles:
-    """Flat arrays of n particles on the sheet of levels; `log_weight` is normalised to a maximum of 0.
+class PressureLag:
+    """What is known of the offset of the height by pressure: `lag_variance` in m2, the same for all particles."""
 
-    `carried`: arrays (n, ...) of the filter's aids, resampled with the particles.
-    """
-
-    x_m: Floats
-    y_m: Floats
-    turn_rad: Floats
-    scale: Floats
-    lag_m: Floats
-    log_weight: Floats
-    hidden: Floats
-    bend: Floats
-    carried: tuple[Floats, ...]
-    z_m: Floats
-
-    def __init__(
-        self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
-        climbing: ClimbSettings, lag_variance: float,
-    ) -> None:  # fmt: skip
-        """`sheet`: of several levels, or None. `lag_variance`: of the lag, in m2, the same for all particles."""
-        self.sheet, self.lag_variance = sheet, lag_variance
-        self._settings, self._climbing, self._rng = settings, climbing, rng
-        self._put(poses)
-
-    def _put(self, poses: DrawnPoses) -> None:
-        """Replace the particles by others with these poses, of which nothing else is known yet."""
-        self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
-        count = len(self.x_m)
-        self.scale = 1.0 + self._settings.start_scale_sd * self._rng.standard_normal(count)
-        self.log_weight, self.bend = np.zeros(count), np.zeros(count)
-        self.hidden = np.zeros((2, count))
-        self.carried = ()
-
-    @property
-    def air(self) -> Air | None:
-        """Mean and standard deviation of the lag of the height by pressure; None if it is unknown."""
-        if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
-            return None
-        weight = self.weight
-        mean = float(weight @ self.lag_m)
-        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
+    def __init__(self, lag_variance: float, climbing: ClimbSettings) -> None:
+        self.lag_variance, self._climbing = lag_variance, climbing
 
     def forget_lag(self) -> None:
         """Make the lag unknown: the barometer may have restarted."""
@@ -79,6 +40,33 @@ class Particles:
         """Let the variance of the lag grow by the time of a segment with pressure."""
         if math.isfinite(change.height_sd_m):
             self.lag_variance += self._climbing.drift_m**2 * change.span_s
+
+
+class Particles(PressureLag):
+    """Flat arrays of n particles on the sheet of levels; `log_weight` is normalised to a maximum of 0.
+
+    `carried`: arrays (n, ...) of the filter's aids, resampled with the particles.
+    """
+
+    def __init__(
+        self, poses: DrawnPoses, log_weight: Floats, sheet: LevelSheet | None, lag_variance: float, climbing: ClimbSettings
+    ) -> None:  # fmt: skip
+        """Particles of which nothing else is known. `sheet`: of several levels, or None."""
+        super().__init__(lag_variance, climbing)
+        self.sheet, self.log_weight = sheet, log_weight
+        self.x_m, self.y_m, self.turn_rad, self.z_m, self.lag_m = poses
+        self.scale, self.bend = np.ones(len(self.x_m)), np.zeros(len(self.x_m))
+        self.hidden = np.zeros((2, len(self.x_m)))
+        self.carried: tuple[Floats, ...] = ()
+
+    @property
+    def air(self) -> Air | None:
+        """Mean and standard deviation of the lag of the height by pressure; None if it is unknown."""
+        if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
+            return None
+        weight = self.weight
+        mean = float(weight @ self.lag_m)
+        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
@@ -112,19 +100,9 @@ class Particles:
         return weight
 
     @property
-    def hidden_shares(self) -> Floats:
-        """Probability (2,) that the view of each ranger is hidden."""
-        shares: Floats = self.hidden @ self.weight
-        return shares
-
-    @property
     def hidden_share(self) -> float:
-        """Mean of `hidden_shares`."""
-        return float(self.hidden_shares.mean())
-
-    def places(self, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
-        """The likeliest places of the trunk, the likeliest first."""
-        return hypotheses(self.map_x_m, self.y_m, self.level, self.turn_rad + walk_heading_rad, self.weight)
+        """Probability that the view of a ranger is hidden, mean of both."""
+        return float((self.hidden @ self.weight).mean())
 
     @property
     def place_share(self) -> float:
@@ -133,18 +111,11 @@ class Particles:
         return places[0].probability if places else 0.0
 
     @property
-    def likeliest_level(self) -> int:
-        """The level with the most weight."""
-        return int(self.level_shares.argmax())
-
-    @property
     def level_shares(self) -> Floats:
-        """Weight on each level up to the highest that has any (k,)."""
-        return np.asarray(np.bincount(self.level, self.weight), np.float64)
-
-    def level_at(self, x_m: float) -> int:
-        """Level of an x on the sheet."""
-        return int(level_of(np.array([x_m]), self.sheet)[0]) if self.sheet else 0
+        """Weight on each level of the plan (levels,)."""
+        if self.sheet is None:
+            return np.ones(1)
+        return np.asarray(np.bincount(self.level, self.weight, len(self.sheet.height_m)), np.float64)
 
     def far_weight(self, x_m: Floats) -> float:
         """Weight further than ROOM_M from the mean, by x (n,) on the sheet or in the map."""

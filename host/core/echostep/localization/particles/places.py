@@ -56,10 +56,11 @@ def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weigh
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
     places: list[LikelyPlace] = []
     while len(places) < MOST_PLACES:
-        probability, *place = _take(int(mass.argmax()), particles, left, mass)
+        probability, x, y, on, square_m2, east, north = _take(int(mass.argmax()), particles, left, mass)
         if probability < LEAST_PROBABILITY:
             break
-        places.append(_hypothesis(probability, *place))
+        sd_m = math.sqrt(max(0.5 * square_m2, 0.0))
+        places.append(LikelyPlace(probability, x, y, int(on), sd_m, math.atan2(north, east)))
     return tuple(sorted(places, key=lambda h: -h.probability))
 
 
@@ -73,13 +74,6 @@ def _squares(x_m: Floats, y_m: Floats, level: Ints) -> Ints:
         if columns * rows * (level.max() + 1) <= MOST_SQUARES:
             return np.asarray((level * rows + north) * columns + east, np.int64)
         side_m *= 2.0
-
-
-def _hypothesis(
-    probability: float, x_m: float, y_m: float, level: float, square_m2: float, east: float, north: float
-) -> LikelyPlace:
-    sd_m = math.sqrt(max(0.5 * square_m2, 0.0))
-    return LikelyPlace(probability, x_m, y_m, int(level), sd_m, math.atan2(north, east))
 
 
 @kernel

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Floats
 from echostep.localization.settings import CloudSettings
 
 # Until a cloud is gathered, particles in one cell of these sizes are one mode: a doorway, a turn into a room
@@ -44,8 +44,3 @@ def kld_size(x_m: Floats, y_m: Floats, turn_rad: Floats, settings: CloudSettings
         return 0
     part = 2.0 / (9.0 * k)
     return int(k / (2.0 * settings.kld) * (1.0 - part + math.sqrt(part) * KLD_QUANTILE) ** 3)
-
-
-def spread_evenly(size: int, count: int) -> Ints:
-    """At most `count` of `size` indices, evenly: in a cloud that is not gathered, light places have more particles than by their weight."""
-    return np.unique(np.linspace(0, size - 1, count).astype(np.int64))

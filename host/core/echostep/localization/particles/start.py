@@ -70,7 +70,8 @@ class Start:
     ) -> tuple[Floats, Floats, Floats, Floats]:
         """x, y on the sheet (m), heading (rad) and log-weight, each (count,); behind a wall from a pose is as improbable as a way through it."""
         if self.pose is None:
-            x, y, heading = _on_floor(allowed_floor(floor, self, sheet), count, rng)
+            heading, allowed = 2.0 * math.pi * rng.random(count), allowed_floor(floor, self, sheet)
+            x, y = allowed.draw(count, rng) if len(allowed.x_m) else np.zeros((2, count))
             return x, y, heading, np.zeros(count)
         is_wide = rng.random((2, count)) < (
             WIDE_SHARE if len(floor.x_m) else 0.0
@@ -120,10 +121,3 @@ def allowed_floor(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor
         map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
         allowed &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
     return Floor(floor.x_m[allowed], floor.y_m[allowed], floor.enclosed[allowed]) if allowed.any() else floor
-
-
-def _on_floor(floor: Floor, count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Poses drawn evenly over the floor, with any heading; at the origin for a plan without a floor."""
-    heading = 2.0 * math.pi * rng.random(count)
-    x, y = floor.draw(count, rng) if len(floor.x_m) else np.zeros((2, count))
-    return x, y, heading
