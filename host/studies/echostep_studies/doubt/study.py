@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatch
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
@@ -27,7 +26,8 @@ from echostep_studies.bench.judgement import FALSE_TRACKING_M
 from echostep_studies.bench.sites import office
 from echostep_studies.doubt import faults, wearers
 from echostep_studies.doubt.wearers import Span
-from echostep_studies.frame.report import Row, rows_by_name
+from echostep_studies.frame.parts import matching
+from echostep_studies.frame.report import Row, by_name, means, named
 from echostep_studies.frame.study import Study, StudyRequest
 
 BEFORE_M, WITHIN_M = 25.0, 18.0  # way before the span, and in it
@@ -40,7 +40,7 @@ COLUMNS = {
     "false_s": "longest s", "worst_m": "worst m", "end_m": "end m", "end_tracking": "ends tracking %",
 }  # fmt: skip
 NOTES = (
-    "false tracking: share of the time that the newest estimate says tracking and is off by more than 1 m; longest: in a row, of all walks; worst: then.",
+    "false tracking: share of the time with tracking and more than 1 m of error; longest: in a row, of all walks; worst: error while tracking.",
     f"An estimate older than {AGE_S:g} s is held against where the trunk is now. Times are those after the span began.",
 )
 
@@ -113,8 +113,8 @@ def _row(name: str, kind: Kind, seed: int) -> DoubtRow:
     scenario = Scenario(site.built, way, seed, PythonBoard(seed), Person(), befalls=befalls)
     scenario.sensors = faults.Heard(scenario.sensors, kind.hears, spans[0])  # type: ignore[assignment]  # has its rows
     tracker = Tracker(kind.plan(site.built), kind.start(scenario.start), seed=seed)
-    now_s, shown = _tracked(tracker, kind.arrives(list(scenario.chunks()), spans[0]))
-    return _judged(name, seed, now_s, shown, scenario.truth, 0.0 if name.startswith(("start", "plan")) else spans[0][0])
+    shown = _tracked(tracker, kind.arrives(list(scenario.chunks()), spans[0]))
+    return _judged(name, seed, shown, scenario.truth, 0.0 if name.startswith(("start", "plan")) else spans[0][0])
 
 
 def _with_pauses(waypoints: Sequence[Waypoint], pause_s: float) -> list[Waypoint]:
@@ -138,23 +138,18 @@ def _span(walk: Walk, *, stands: bool) -> Span:
     return first if stands else (0.5 * sum(first), 0.5 * sum(second))
 
 
-def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> tuple[Floats, list[Estimate | None]]:
+def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[tuple[float, Estimate]]:
     """What is shown after each tenth of a second, and when."""
-    now_s, shown, portion, newest = [], [], [], None
-    for chunk in chunks:
-        if portion and chunk.t_arrival_ns - portion[0].t_arrival_ns > PORTION_NS:
-            newest = (tracker.take(portion_of(portion)) or [newest])[-1]
-            now_s.append(1e-9 * (chunk.t_arrival_ns - START_NS))
-            shown.append(newest)
-            portion = []
-        portion.append(chunk)
-    return np.array(now_s), shown
+    shown: list[tuple[float, Estimate]] = []
+    for _, together in groupby(chunks, lambda chunk: chunk.t_arrival_ns // PORTION_NS):
+        portion = list(together)
+        newest = tracker.take(portion_of(portion))[-1:] or [estimate for _, estimate in shown[-1:]]
+        shown += [(1e-9 * (portion[-1].t_arrival_ns - START_NS), estimate) for estimate in newest]
+    return shown
 
 
-def _judged(
-    name: str, seed: int, now_s: Floats, shown: Sequence[Estimate | None], truth: Floats, from_s: float
-) -> DoubtRow:
-    later = [(t, e) for t, e in zip(now_s.tolist(), shown, strict=True) if e is not None and t >= from_s]
+def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth: Floats, from_s: float) -> DoubtRow:
+    later = [(t, e) for t, e in shown if t >= from_s]
     at_s = np.array([e.t_s if t - e.t_s < AGE_S else t for t, e in later])
     true = np.column_stack([np.interp(at_s, truth[:, 0], truth[:, k]) for k in (1, 2)])
     off_m = np.hypot(*(np.array([(e.x_m, e.y_m) for _, e in later]) - true).T)
@@ -171,27 +166,18 @@ def _judged(
     )  # fmt: skip
 
 
-def _summaries(rows: Sequence[DoubtRow]) -> list[Row]:
-    return [_summary(group) for group in rows_by_name(rows)]
-
-
 def _summary(rows: Sequence[DoubtRow]) -> Row:
-    def mean(name: str, scale: float = 1.0) -> float:
-        return round(scale * float(np.mean([getattr(row, name) for row in rows])), 5)
-
-    return {
-        "name": rows[0].name, "runs": len(rows), "tracking": mean("tracking", 100.0), "lost": mean("lost", 100.0), "false": mean("false", 100.0),
-        "false_s": max(row.false_s for row in rows), "worst_m": max(row.worst_m for row in rows), "end_m": mean("end_m"),
-        "end_tracking": mean("end_tracking", 100.0),
-    }  # fmt: skip
+    shares = {
+        key: 100.0 * value for key, value in means(rows, ("tracking", "lost", "false", "end_tracking"), 5).items()
+    }
+    worst = {key: max(getattr(row, key) for row in rows) for key in ("false_s", "worst_m")}
+    return {**named(rows), **shares, **worst, **means(rows, ("end_m",), 5)}
 
 
 def doubt_study(pattern: str = "*") -> Study[DoubtRow, Row]:
     """The study of the kinds whose names match a pattern."""
-    names = tuple(name for name in KINDS if fnmatch(name, pattern))
-    if not names:
-        raise EchostepError(f"--rows {pattern}: no row is named so; there are: {', '.join(KINDS)}")
-    return Study("doubt", (DoubtRow,), partial(doubt_run, names), _summaries, _tables)
+    names = matching(KINDS, pattern)
+    return Study("doubt", (DoubtRow,), partial(doubt_run, names), by_name(_summary), _tables)
 
 
 def _tables(rows: list[Row], request: StudyRequest) -> list[Table]:
