@@ -22,7 +22,7 @@ from echostep.jit import lean_part
 MOST_ROLL, MOST_STRAIN = 0.46, 0.73
 LEVEL_DEGREES = 4.0  # of freedom of the innovation's level part
 LONGEST_S = 1.5  # of a stance in walking
-LONGEST_FLIGHT_S = 5.0  # a slow step over an obstacle takes 3; assumed
+LONGEST_FLIGHT_S = 5.0  # without a rest, for a foot: a slow step over an obstacle takes 3; assumed
 FEWEST, MEMORY = 4, 10  # stances for a judgement, and of its mean
 MOST = 5.0  # of one stance
 
@@ -46,9 +46,3 @@ def judge(s: ZuptState, span_s: float) -> None:
         s.unrest += (min(max(roll / MOST_ROLL, s.strain / s.strained / MOST_STRAIN), MOST) - s.unrest) / s.judged
     s.roll[0] = s.roll[1] = s.strain = 0.0
     s.strained = 0
-
-
-@lean_part
-def of_flight(flight_s: float) -> float:
-    """The unrest of a sensor that did not rest for longer than any swing lasts, 0 of one that did."""
-    return flight_s / LONGEST_FLIGHT_S if flight_s > LONGEST_FLIGHT_S else 0.0

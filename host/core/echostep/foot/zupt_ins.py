@@ -319,7 +319,7 @@ def _write_step(s: ZuptState, nav: Nav, row: Floats) -> None:
     row[out.TOE] = mounting.toe(s.tilt_square, s.tilt_cube)
     offset = ins.dot(ins.rotation(nav.attitude)[2], nav.accel_bias)
     row[out.EXCESS] = offset / ins.GRAVITY_M_S2 if abs(offset) > nav.noise.offset else 0.0
-    row[out.UNREST] = max(s.unrest if s.judged >= unrest.FEWEST else 0.0, unrest.of_flight(s.flight_s))
+    row[out.UNREST] = max(s.unrest if s.judged >= unrest.FEWEST else 0.0, s.flight_s / unrest.LONGEST_FLIGHT_S)
     for i in range(3):
         s.tilt_square[i] *= mounting.MEMORY
         s.tilt_cube[i] *= mounting.MEMORY

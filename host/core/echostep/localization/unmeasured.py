@@ -17,8 +17,8 @@ from dataclasses import replace
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
-# Assumed, not measured. Rates (1/s) at which such a way begins: with a witness, and where the rangers have fallen silent
-BEGINS_PER_S, UNSEEN_PER_S = 1e-4, 0.03
+# Assumed, not measured. Rates (1/s) at which such a way begins: with a witness; in a silence that the stand began with; where it fell silent
+BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
@@ -68,7 +68,8 @@ class UnmeasuredWay:
         """Odds that such a way has begun by the end of a segment, before its evidence."""
         segment, heard = measured.segment, bool((measured.range_m > 0.0).any())
         self._has_heard = self._has_heard or heard
-        per_s = UNSEEN_PER_S if self._has_heard and not heard else BEGINS_PER_S
+        silent_per_s = UNSEEN_PER_S if any(self._heard) else SILENT_PER_S
+        per_s = silent_per_s if self._has_heard and not heard else BEGINS_PER_S
         stood = (1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s))
         return (1.0 - stood) / stood
 

@@ -160,8 +160,9 @@ class FootLegsHandover:
         """Make the foot active again at its first straight stride, once the legs have reached it or CATCH_UP_S is over."""
         assert self._leg_path is not None
         empty = self._covered_s == -math.inf  # the legs have given no segment
-        while not empty and self._returned and not self._can_rejoin(self._returned[0]):
-            del self._returned[0]
+        if not empty:
+            late = (k for k, s in enumerate(self._returned) if _is_straight(s) and s.t1_s > self._covered_s)
+            del self._returned[: next(late, len(self._returned))]
         if not self._returned:
             return []
         first = self._returned[0]
@@ -178,9 +179,6 @@ class FootLegsHandover:
         self._kept_segments.clear()
         self._kept_segments.extend(segments)
         return [self._append(segment, self._foot_turn_rad) for segment in segments]
-
-    def _can_rejoin(self, segment: PathSegment) -> bool:
-        return _is_straight(segment) and segment.t1_s > self._covered_s
 
     def _bridge(self, first: PathSegment) -> list[PathSegment]:
         """A segment without displacement over the gap between the legs' end and the foot's first segment, in the foot's frame; none without a gap."""

@@ -147,7 +147,7 @@ class FrontEnd:
         # Time: ticks, sample counters and arrival times -> t_s of every message.
         board, mtx = _board_arrivals(frames, frame_chunk, t_arrival_ns), _foot_arrivals(samples, t_arrival_ns)
         times = self.timeline.times(board, mtx)
-        self._count_bad_times(board, times)
+        self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
         self._advance_clock(times)
         # Board: frames -> reports about itself, pings and heights, blocks of leg gyro samples.
         self._keep_reports(frames, times)
@@ -179,10 +179,6 @@ class FrontEnd:
         for k, port in enumerate(portion.ports):
             if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, LINES):
                 self._unknown_ports += int((portion.port == k).sum())
-
-    def _count_bad_times(self, board: Arrivals, times: Times) -> None:
-        """Count messages that should have a time but have none."""
-        self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
 
     def _advance_clock(self, times: Times) -> None:
         """Keep the newest time of either port."""
@@ -267,15 +263,14 @@ class FrontEnd:
             self._add_belt(blocks, int(message_index[sample_index]))
             for aligned in self.alignment.feed([event], float(t_s[sample_index])):
                 fused = self.heading_fusion.corrected(aligned)
-                segments = self._step_segments(fused) if isinstance(fused, Step) else self.path.add_stance(fused)
+                if isinstance(fused, Step):
+                    segments = [replace(s, belt=self.heading_fusion.evidence) for s in self.path.add_step(fused)]
+                else:
+                    segments = self.path.add_stance(fused)
                 completed.append((int(message_index[sample_index]), segments))
             begin = sample_index
         self._add_belt(blocks)
         return completed + self._standing_segments(foot, t_s, message_index, begin, len(t_s))
-
-    def _step_segments(self, step: Step) -> list[PathSegment]:
-        """The segment of a step, with the evidence of the belt."""
-        return [replace(segment, belt=self.heading_fusion.evidence) for segment in self.path.add_step(step)]
 
     def _add_belt(self, blocks: deque[tuple[int, GyroBlock]], before: float = math.inf) -> None:
         """Hand the gyro blocks that are filled before a message to the heading fusion."""

@@ -87,13 +87,9 @@ class OutputFormats:
             return _first(self.mode, self.settings, rows, GIVEN)
         told_mode, told_settings = self._told.get(bus, (None, None))
         configured = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
-        if (
-            configured is None
-            and told_mode is not None
-            and told_settings is not None
-            and not _is_known(told_mode, told_settings)
-        ):
-            return None
+        if configured is None and told_mode is not None and told_settings is not None:
+            if _known(told_mode, told_settings) is None:
+                return None
         return configured or _first(None, None, rows, BY_LENGTH)
 
 
@@ -110,7 +106,8 @@ def _first(mode: int | None, settings: int | None, rows: Octets, how: str) -> Fo
     """The simplest format of this length, with this mode and these settings if they are known. A fully known format needs no possible values."""
     formats = _formats(rows.shape[1])
     if mode is not None and settings is not None:
-        formats = _known_formats(mode, settings, rows.shape[1])
+        known = _known(mode, settings)
+        formats = (known,) if known is not None and known.length == rows.shape[1] else ()
     for output in formats:
         if (mode is None or output.mode == mode) and (settings is None or output.settings == settings):
             whole = mode is not None and settings is not None
@@ -119,22 +116,12 @@ def _first(mode: int | None, settings: int | None, rows: Octets, how: str) -> Fo
     return None
 
 
-def _known_formats(mode: int, settings: int, length: int) -> tuple[OutputFormat, ...]:
-    """The format with this mode and these settings, if an MTx has it and its payloads have this length."""
+def _known(mode: int, settings: int) -> OutputFormat | None:
+    """The format with this mode and these settings, if an MTx has it."""
     try:
-        output = OutputFormat(mode, settings)
+        return OutputFormat(mode, settings)
     except ValueError:
-        return ()
-    return (output,) if output.length == length else ()
-
-
-def _is_known(mode: int, settings: int) -> bool:
-    """Whether an MTx has this format."""
-    try:
-        OutputFormat(mode, settings)
-    except ValueError:
-        return False
-    return True
+        return None
 
 
 @cache

@@ -188,9 +188,8 @@ class MtxReader:
         if len(index):
             self._last, self._alike = measured[-1:], int(alike[-1])
         fresh: Bools = alike < HELD
-        held = len(fresh) - int(fresh.sum())
-        self._tally[gates.GOOD] -= held
-        self._tally[gates.REPEATED] += held
+        held = int((~fresh).sum())
+        self._tally[[gates.GOOD, gates.REPEATED]] += (-held, held)
         return fresh
 
     def _decode(self, frames: MtFrames) -> Messages:
