@@ -91,12 +91,12 @@ def _signature(name: str, value: Any) -> str:
 
 
 def _parameter(parameter: inspect.Parameter) -> str:
-    """`name: type = default`; a default that is made for each call is `...`."""
+    """`name: type = default`; a default that is long, or made for each call, is `...`."""
     text = f"{parameter.name}: {_annotation(parameter.annotation)}"
     if parameter.default is parameter.empty:
         return text
     default = str(parameter.default) if isinstance(parameter.default, Enum) else repr(parameter.default)
-    return f"{text} = {'...' if default == '<factory>' else default}"
+    return f"{text} = {'...' if default == '<factory>' or len(default) > LINE else default}"
 
 
 def _annotation(value: Any) -> str:
