@@ -83,6 +83,12 @@ bool foot_run(uint32_t now)
 	return false;
 }
 
+static void note_wrong_bits(void)
+{
+	health.fault = FAULT_BAD_VALUE;
+	health.errors++;
+}
+
 static void send(const struct capture_edge *edge, const int16_t *a)
 {
 	struct msg_foot m = { edge->ticks, edge->edge, a[3], a[4], a[5], a[0], a[1], a[2] };
@@ -97,14 +103,18 @@ bool foot_take(const struct capture_edge *edge)
 	if (health.foot_state == FOOT_STATE_SOUGHT || !is_set)
 		return true;
 	uint8_t fault = icm20649_read(CHIP, &sample);
-	if (fault != FAULT_NONE) {
+	if (fault == FAULT_NO_ANSWER) {
 		fail(edge->ticks, fault);
+		return true;
+	}
+	due = edge->ticks + SILENT_TICKS;
+	if (fault != FAULT_NONE) {
+		note_wrong_bits();
 		return true;
 	}
 	health.foot_state = FOOT_STATE_RUNNING;
 	health.missed = (uint16_t)(health.missed + edge->missed);
 	health.temperature = sample.temperature;
-	due = edge->ticks + SILENT_TICKS;
 	if (link_wants(REPORTS_FOOT))
 		send(edge, sample.axes);
 	return true;
@@ -115,8 +125,7 @@ static void check_bits(void)
 {
 	if (health.foot_state != FOOT_STATE_RUNNING || icm20649_answers(CHIP))
 		return;
-	health.fault = FAULT_BAD_VALUE;
-	health.errors++;
+	note_wrong_bits();
 }
 
 void foot_send_health(void)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "icm20649.h"
+#include <string.h>   /* memcmp */
 #include "messages.h" /* FAULT_* */
 
 /* Registers and values [ICM-20649 data sheet DS-000192, chapters 7 to 10]. Of user bank 0: */
@@ -81,7 +82,8 @@ static int16_t read_word(void)
 	return (int16_t)(uint16_t)((uint16_t)high << 8 | low);
 }
 
-uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)
+/* true: it is neither all ones nor all zeros. */
+static bool read_once(enum chip chip, struct icm20649_sample *out)
 {
 	bool replies = false;
 	(void)spi_begin(chip, SPI_MODE3, READ_FLAG | REGISTER_ACCEL_XOUT_H);
@@ -91,5 +93,14 @@ uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)
 	}
 	out->temperature = read_word();
 	spi_release();
-	return replies ? FAULT_NONE : FAULT_NO_ANSWER;
+	return replies;
+}
+
+uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out)
+{
+	struct icm20649_sample again;
+	bool replies = read_once(chip, out);
+	if (!read_once(chip, &again) && !replies)
+		return FAULT_NO_ANSWER;
+	return memcmp(out, &again, sizeof again) ? FAULT_BAD_VALUE : FAULT_NONE;
 }

@@ -27,7 +27,7 @@ void icm20649_reset(enum chip chip);
 /* Writes its settings after a reset: 225 samples a second. */
 void icm20649_start(enum chip chip);
 
-/* The newest sample (0.1 ms); FAULT_NO_ANSWER: the part is not there. */
+/* The newest sample, read twice (0.3 ms), since it has no checksum. FAULT_NO_ANSWER: the part is not there; FAULT_BAD_VALUE: the two differ. */
 uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out);
 
 #endif

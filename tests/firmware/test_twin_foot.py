@@ -92,7 +92,17 @@ def test_wrong_bits_from_the_part_are_counted_and_named(foot: Bench) -> None:
     for message in run(foot, 12_000):
         kept.add(message)
         said |= {str(finding) for finding in board_findings(kept)}
-    assert [text for text in said if text.startswith("foot sensor (ICM-20649): sent wrong bits 1 time in")]
+    assert [text for text in said if text.startswith("foot sensor (ICM-20649): sent wrong bits ")]
+
+
+@pytest.mark.parametrize("errors", [1, 3])
+def test_no_sample_with_wrong_bits_reaches_the_host(foot: Bench, errors: int) -> None:
+    """P1: 1 byte in 1000 wrong took the walker 923 m away; each sample is read twice."""
+    foot.fault(f"spi_errors={errors}")
+    found = samples(run(foot, 10_000) + run(foot, 10_000))
+    assert {x[2:] for x in found} == {tuple(STILL.ravel())}
+    assert len(found) > 0.9 * 20 * RATE_HZ
+    assert health(foot).errors > 100 * errors / 3
 
 
 def test_every_sample_comes_and_is_stamped_within_the_limit(foot: Bench) -> None:
