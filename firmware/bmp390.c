@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "bmp390.h"
+#include <string.h>        /* memcmp */
 #include "board.h"         /* spi_* */
 #include "configuration.h" /* mode */
 #include "messages.h"      /* FAULT_* */
@@ -14,7 +15,7 @@
 #define REGISTER_OSR 0x1Cu
 #define REGISTER_ODR 0x1Du
 #define REGISTER_CONFIG 0x1Fu
-#define REGISTER_COEFFICIENTS 0x31u
+#define REGISTER_CHECKSUM 0x30u /* then the coefficients */
 #define REGISTER_CMD 0x7Eu
 #define READ_FLAG 0x80u
 #define CHIP_ID 0x60u
@@ -36,6 +37,7 @@
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)
 
 #define COEFFICIENTS_SIZE 21u
+#define CRC_POLYNOMIAL 0x1Du /* of their checksum, from 0xFF on, inverted in the end [Bosch, bmp3_selftest.c] */
 #define DATA_SIZE 6u
 #define COUNTS_PER_PA 4.0f
 #define COUNTS_PER_DEGREE 20.0f
@@ -103,11 +105,22 @@ static float s8(uint8_t byte)
 	return (float)(int8_t)byte;
 }
 
-/* The scales of the coefficients [8.4]; false: the chip's memory is empty. */
+static uint8_t checksum(const uint8_t *bytes, uint8_t length)
+{
+	uint8_t crc = 0xFF;
+	while (length--) {
+		crc ^= *bytes++;
+		for (uint8_t n = 0; n < 8; n++)
+			crc = (uint8_t)((uint8_t)(crc << 1) ^ (crc & 0x80u ? CRC_POLYNOMIAL : 0u));
+	}
+	return (uint8_t)~crc;
+}
+
+/* The scales of the coefficients [8.4]; false: their checksum is wrong. */
 static bool read_coefficients(void)
 {
-	uint8_t c[COEFFICIENTS_SIZE];
-	read(REGISTER_COEFFICIENTS, c, sizeof c);
+	uint8_t bytes[1 + COEFFICIENTS_SIZE], *c = bytes + 1;
+	read(REGISTER_CHECKSUM, bytes, sizeof bytes);
 	t1 = u16(c) * 0x1p8f;
 	t2 = u16(c + 2) * 0x1p-30f;
 	t3 = s8(c[4]) * 0x1p-48f;
@@ -122,7 +135,7 @@ static bool read_coefficients(void)
 	p9 = s16(c + 17) * 0x1p-48f;
 	p10 = s8(c[19]) * 0x1p-48f;
 	p11 = s8(c[20]) * 0x1p-65f;
-	return (c[0] | c[1]) != 0 && !(c[0] == NO_REPLY && c[1] == NO_REPLY);
+	return bytes[0] == checksum(c, COEFFICIENTS_SIZE);
 }
 
 /* Temperature in degC [8.5]. */
@@ -141,26 +154,43 @@ static float pressure_of(uint32_t raw, float t)
 	return offset + r * (slope + r * (p9 + t * p10 + r * p11));
 }
 
-static uint8_t await_sample(uint32_t now)
+static void await_sample(uint32_t now)
 {
 	earliest = now + SAMPLE_MIN_TICKS;
 	deadline = now + SAMPLE_MAX_TICKS;
-	return FAULT_NONE;
+}
+
+/* Writes the settings, or reads them back; true: none differs. */
+static bool go_through_settings(bool writes)
+{
+	static const uint8_t settings[][3] FLASH = { /* register, value in the fast mode, in the slow one */
+		{ REGISTER_OSR, OSR_FAST, OSR_SLOW },
+		{ REGISTER_ODR, ODR_FAST, ODR_SLOW },
+		{ REGISTER_CONFIG, IIR_3, IIR_3 },
+		{ REGISTER_PWR_CTRL, PRESSURE_AND_TEMPERATURE_NORMAL, PRESSURE_AND_TEMPERATURE_NORMAL },
+	};
+	uint8_t mode = configuration.pressure_mode == PRESSURE_MODE_HIGH_RESOLUTION ? 2 : 1;
+	bool equal = true;
+	for (uint8_t n = 0; n < sizeof settings / sizeof *settings; n++) {
+		uint8_t address = flash_byte(&settings[n][0]), value = flash_byte(&settings[n][mode]);
+		if (writes)
+			write8(address, value);
+		else
+			equal = read8(address) == value && equal;
+	}
+	return equal;
 }
 
 static uint8_t measure(uint32_t now)
 {
-	bool slow = configuration.pressure_mode == PRESSURE_MODE_HIGH_RESOLUTION;
 	if (read8(REGISTER_CHIP_ID) != CHIP_ID)
 		return FAULT_NO_ANSWER;
 	if (!read_coefficients())
 		return FAULT_EEPROM;
-	write8(REGISTER_OSR, slow ? OSR_SLOW : OSR_FAST);
-	write8(REGISTER_ODR, slow ? ODR_SLOW : ODR_FAST);
-	write8(REGISTER_CONFIG, IIR_3);
-	write8(REGISTER_PWR_CTRL, PRESSURE_AND_TEMPERATURE_NORMAL);
+	(void)go_through_settings(true);
 	measuring = true;
-	return await_sample(now);
+	await_sample(now);
+	return FAULT_NONE;
 }
 
 static uint32_t raw_of(const uint8_t *bytes)
@@ -168,10 +198,8 @@ static uint32_t raw_of(const uint8_t *bytes)
 	return (uint32_t)bytes[2] << 16 | (uint16_t)((uint16_t)bytes[1] << 8 | bytes[0]);
 }
 
-static uint8_t sample(uint32_t now, struct pressure_step *out)
+static uint8_t convert(const uint8_t *d, struct pressure_step *out)
 {
-	uint8_t d[DATA_SIZE];
-	read(REGISTER_DATA, d, sizeof d);
 	uint32_t raw_pressure = raw_of(d), raw_temperature = raw_of(d + 3);
 	if (raw_pressure == UNMEASURED || raw_temperature == UNMEASURED)
 		return FAULT_BAD_VALUE;
@@ -180,8 +208,21 @@ static uint8_t sample(uint32_t now, struct pressure_step *out)
 		return FAULT_BAD_VALUE;
 	out->pressure = (uint32_t)(pa * COUNTS_PER_PA + 0.5f);
 	out->temperature = (int16_t)(t * COUNTS_PER_DEGREE);
-	out->wrong_bits = read8(REGISTER_CHIP_ID) != CHIP_ID; /* a sample has no checksum: wrong bits show where the content is known */
-	return await_sample(now);
+	return FAULT_NONE;
+}
+
+/* A sample has no checksum: it is read twice. Settings may have arrived with a wrong bit: they are read back, and written anew. */
+static uint8_t sample(uint32_t now, struct pressure_step *out)
+{
+	uint8_t d[2][DATA_SIZE];
+	read(REGISTER_DATA, d[0], DATA_SIZE);
+	read(REGISTER_DATA, d[1], DATA_SIZE);
+	bool equal = memcmp(d[0], d[1], DATA_SIZE) == 0, set = go_through_settings(false);
+	out->wrong_bits = !equal || !set;
+	if (!set)
+		(void)go_through_settings(true);
+	await_sample(now);
+	return equal ? convert(d[0], out) : FAULT_NONE;
 }
 
 static uint8_t poll(uint32_t now, struct pressure_step *out)

@@ -91,7 +91,7 @@ enum capture_state { CAPTURE_WAITING, CAPTURE_HIGH, CAPTURE_OVER };
 struct capture_pulse {
 	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
 };
-bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+bool capture_trigger(uint8_t side);   /* sends a trigger pulse (60 us); false: the line is high, or pulses without one */
 bool capture_pull_low(uint8_t side);  /* pulls the line low for 0.2 ms, against 1 kohm in Echo; true: it stays low */
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
 void capture_end_pulse(uint8_t side); /* gives up waiting */

@@ -35,10 +35,13 @@ static void fail(uint32_t now, uint8_t fault)
 	due = now + SEEK_TICKS;
 }
 
-/* A gyro at the thigh that answers, and has proven what it is, is another part. */
+/* Not on a board that has found a ranger, a compass or a gyro since its start. */
 static bool may_be_here(void)
 {
-	return is_foot_board() || !(status.healthy & 1u << DEVICE_THIGH);
+	for (uint8_t place = DEVICE_RANGER_LEFT; place < DEVICE_PRESSURE; place++)
+		if (parts_in(place) != PART_NONE)
+			return is_foot_board();
+	return true;
 }
 
 static bool seek(uint32_t now)
@@ -120,19 +123,25 @@ bool foot_take(const struct capture_edge *edge)
 	return true;
 }
 
-/* A sample has no checksum: wrong bits show where the content is known. */
-static void check_bits(void)
+/* Settings may have arrived with a wrong bit, or been lost: they are read back, and written anew. */
+static void check_settings(void)
 {
-	if (health.foot_state != FOOT_STATE_RUNNING || icm20649_answers(CHIP))
+	if (health.foot_state != FOOT_STATE_RUNNING || icm20649_is_set(CHIP))
 		return;
+	icm20649_start(CHIP);
 	note_wrong_bits();
+}
+
+bool foot_is_well(void)
+{
+	return !is_foot_board() || health.foot_state == FOOT_STATE_RUNNING;
 }
 
 void foot_send_health(void)
 {
 	if (!is_foot_board())
 		return;
-	check_bits();
+	check_settings();
 	health.ticks = clock_now();
 	link_send(MSG_FOOT_HEALTH, msg_pack_foot_health(link_body(), &health));
 }

@@ -17,6 +17,9 @@ bool foot_run(uint32_t now);
 /* Reads and sends the sample of a data-ready edge (0.1 ms); false: this is no foot board, the edge is not the part's. */
 bool foot_take(const struct capture_edge *edge);
 
+/* Whether this is no foot board, or its part has samples. */
+bool foot_is_well(void);
+
 /* Sends `foot_health`, if this is a foot board. */
 void foot_send_health(void);
 

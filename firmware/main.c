@@ -247,7 +247,7 @@ static uint32_t run_sensors(void)
 static void beat(void)
 {
 	uint8_t wanted = configuration.sensors & (uint8_t)~SENSORS_SYNC;
-	bool well = (status.healthy & wanted) == wanted;
+	bool well = (status.healthy & wanted) == wanted && foot_is_well();
 	board_lamp((clock_now() >> (well ? 20 : 17)) & 1u);
 }
 

@@ -128,10 +128,13 @@ static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_fli
 	link_send(MSG_PING, msg_pack_ping(link_body(), &ping));
 }
 
+/* FAULT_NONE: an answer, but not yet enough to know the kind. */
 static void fail(struct ranger *r, uint32_t now, uint8_t fault)
 {
-	status_failed((enum device)r->index, fault);
-	report(r, OUTCOME_BUS_ERROR, 0);
+	if (fault != FAULT_NONE) {
+		status_failed((enum device)r->index, fault);
+		report(r, OUTCOME_BUS_ERROR, 0);
+	}
 	schedule_next(r, now);
 }
 
@@ -194,20 +197,24 @@ static void fail_or_seek_on(struct ranger *r, uint32_t now)
 }
 
 /* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. A module without a
- * timeout holds it for ever, unless it is pulled low. */
+ * timeout holds it for ever, unless it is pulled low: an answer that does not end shows that one is there. */
 static void hold(struct ranger *r, uint32_t now)
 {
-	if (r->kind == PULSE && r->holds < HOLDS_MAX) {
+	bool heard = pulse_was_heard(r->index);
+	if (heard && r->holds < HOLDS_MAX) {
 		r->holds++;
 		r->due = now + HOLD_TICKS;
 		return;
 	}
-	if (parts_in(r->index) == PART_PULSE && capture_pull_low(r->index)) {
+	if (heard)
+		parts_found(r->index, PART_PULSE, 0);
+	bool found = parts_in(r->index) == PART_PULSE;
+	if (found && capture_pull_low(r->index)) {
 		status_failed((enum device)r->index, FAULT_TOO_LATE);
 		r->holds = 0;
 		return;
 	}
-	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : r->ranging.fault);
+	miss(r, now, found ? FAULT_ALWAYS_READY : r->ranging.fault);
 }
 
 static void trigger(struct ranger *r, uint32_t now)
@@ -218,9 +225,11 @@ static void trigger(struct ranger *r, uint32_t now)
 		r->pinging = maxsonar_begin(r->index, &r->ranging);
 	else if (r->pinged == SRF02)
 		r->pinging = srf02_begin(r->index, &r->ranging);
-	else if (pulse_begin(r->index, &r->ranging))
-		r->pinging = true;
 	else
+		r->pinging = pulse_begin(r->index, &r->ranging);
+	if (r->pinging)
+		r->holds = 0;
+	else if (r->pinged == PULSE)
 		hold(r, now);
 }
 

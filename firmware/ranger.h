@@ -39,7 +39,7 @@ struct ranging {
 	uint32_t trigger;           /* time of the ping, ticks */
 	uint32_t next;              /* of the driver's next call, unless an interrupt comes earlier */
 	uint16_t time_of_flight_us; /* 0: no echo */
-	uint8_t fault;              /* FAULT_*, of RANGING_FAILED */
+	uint8_t fault;              /* FAULT_*, of RANGING_FAILED and of RANGING_REFUSED */
 };
 
 #define RANGER_IDLE_TICKS (30u * TICKS_PER_MS) /* until the next call of a driver that waits for an interrupt */

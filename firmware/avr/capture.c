@@ -12,7 +12,8 @@
 
 #define LEFT 0u
 #define RIGHT 1u
-#define TRIGGER_US 12 /* at least 10 [HC-SR04 user guide] */
+#define TRIGGER_US 60 /* at least 10 [HC-SR04 user guide], 50 [RCWL-1655] */
+#define RISE_US 12
 #define PULL_US 200
 #define TRIGGER_LEFT BIT(PF5)
 #define TRIGGER_RIGHT BIT(PF4)
@@ -95,17 +96,26 @@ bool capture_trigger(uint8_t side)
 	return true;
 }
 
-/* Never drives high: the pull-up goes off before, and on after it. */
+/* Never drives high: the pull-up goes off before, and on after it. The edges that it makes are nobody's. */
 bool capture_pull_low(uint8_t side)
 {
 	volatile uint8_t *port = side == LEFT ? &PORTD : &PORTC, *direction = side == LEFT ? &DDRD : &DDRC;
 	uint8_t line = side == LEFT ? LINE_LEFT : LINE_RIGHT;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		TIMSK1 &= (uint8_t)~BIT(ICIE1);
+	}
 	*port &= (uint8_t)~line;
 	*direction |= line;
 	_delay_us(PULL_US);
 	*direction &= (uint8_t)~line;
 	*port |= line;
-	_delay_us(TRIGGER_US);
+	_delay_us(RISE_US);
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		TIFR1 = side == LEFT ? BIT(ICF1) : 0;
+		TIMSK1 |= BIT(ICIE1);
+	}
 	return !line_is_taken(side);
 }
 

@@ -46,11 +46,12 @@ void usb_start(void)
  * stays idle the flag may come back at once: the interrupt is off until traffic does [Arduino's USBCore.cpp]. */
 ISR(USB_GEN_vect)
 {
-	if (UDINT & BIT(EORSTI))
+	uint8_t flags = UDINT;
+	suspended = !(flags & BIT(EORSTI));
+	if (!suspended)
 		bus_was_reset = true;
-	suspended = !(UDINT & BIT(EORSTI));
 	UDIEN = suspended ? BIT(EORSTE) : BIT(EORSTE) | BIT(SUSPE);
-	UDINT = 0;
+	UDINT = (uint8_t)~flags; /* what comes after the look stays flagged */
 	board_awake = true;
 }
 

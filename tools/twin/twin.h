@@ -120,6 +120,7 @@ void usb_hub_clear(void);
 /* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
 void usb_host_unplug(void);
+void usb_host_reset(void);   /* of the bus, after which it is enumerated again */
 void usb_host_open(bool on); /* a program has the port open (DTR) */
 void usb_host_send(const uint8_t *bytes, unsigned length);
 

@@ -19,6 +19,7 @@ static struct spi_device *devices;
 static avr_irq_t *miso;
 static uint8_t outgoing;
 FAULT_SWITCH(spi_errors, "<=1000", NULL, 0) /* bytes in 1000 that a part sends and that arrive with a wrong bit */
+FAULT_SWITCH(mosi_errors, "<=1000", NULL, 0) /* the same of those from the processor */
 
 static unsigned divisor(void)
 {
@@ -90,7 +91,7 @@ static void write_byte(avr_t *a, avr_io_addr_t address, uint8_t value, void *par
 	if ((a->data[SPCR] & (SPE | MSTR)) != (SPE | MSTR))
 		return;
 	avr_regbit_clear(a, vector(VECTOR)->raised);
-	outgoing = value;
+	outgoing = disturbed(value, mosi_errors.value);
 	avr_cycle_timer_register(a, divisor() * 8 + 1, done, NULL);
 }
 

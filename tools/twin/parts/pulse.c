@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Two pulse rangers of the kind of RCWL-1601 and HC-SR04P [HC-SR04 user guide].
  *
- * A trigger of at least 10 us starts a burst; the echo line rises at its end and falls with the first echo, or after 38 ms without one.
+ * A trigger of at least 50 us starts a burst; the echo line rises at its end and falls with the first echo, or after 38 ms without one.
  * Triggers are wired to PF5 and PF4, echo lines to PD4 and PC7 (left, right). The echo is of the own burst, or of the other ranger's. */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 
 #include "parts/parts.h"
 
-#define TRIGGER_LEAST US(10)
+#define TRIGGER_LEAST US(50) /* of an RCWL-1655; most are content with 10 us */
 #define BURST_US 450u   /* from the end of the trigger to the rising edge, 8 cycles of 40 kHz and the module's own program */
 #define SPREAD_US 30u   /* random part of it */
 #define NO_ECHO_US 38000u

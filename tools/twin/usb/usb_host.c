@@ -229,6 +229,14 @@ static void next_step(void)
 	}
 }
 
+void usb_host_reset(void)
+{
+	reset_bus();
+	go(ENUMERATING);
+	step = 0;
+	control_size = usb_system_step(0)[6]; /* before the device has named it: Windows reads 64 bytes at once */
+}
+
 /* Once a millisecond: follows attach and detach, and gives up requests without an answer. */
 static void watch(void)
 {
@@ -237,10 +245,7 @@ static void watch(void)
 	} else if (state == DETACHED) {
 		go(DEBOUNCING);
 	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS + usb_hub_debounce_ms()) {
-		reset_bus();
-		go(ENUMERATING);
-		step = 0;
-		control_size = usb_system_step(0)[6]; /* before the device has named it: Windows reads 64 bytes at once */
+		usb_host_reset();
 	}
 	if (waited_ms == IDLE_MS && (state == DEBOUNCING || state == SUSPENDED))
 		usb_bus_event(USB_SUSPEND, 0);

@@ -143,7 +143,7 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             fault, span = Fault(status_field(status, "fault", device)), f"in the last {span_s(status, previous):.0f} s"
             what = f"failed {count} times {span} ({fault.name.lower().replace('_', ' ')}), and answers again"
             remedy = "a loose plug is likely: move the cable and watch"
-            if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) is Part.BMP390):
+            if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) in (Part.BMP390, Part.LIS3MDL)):
                 what = f"sent wrong bits {count} time{'s' if count > 1 else ''} {span}"
                 remedy = WRONG_BITS_REMEDY
             if fault is Fault.TOO_LATE and part_in(reports, device) is Part.PULSE:

@@ -13,7 +13,7 @@ _AGAIN = "power-cycle the board; if it stays, replace the part"
 
 _BMP390 = {
     Fault.NO_ANSWER: ("does not answer", f"{_SPI}; its chip select is D6"),
-    Fault.EEPROM: ("its calibration is empty", _AGAIN),
+    Fault.EEPROM: ("its calibration reads with a wrong check sum", f"{_SPI}; {_AGAIN}"),
     Fault.NEVER_READY: ("has had no sample for 2 s", f"it may have lost its supply for a moment: {_SPI}"),
     Fault.ALWAYS_READY: ("reports a sample that it cannot have yet", f"its data line may be held high: {_SPI}"),
     Fault.BAD_VALUE: ("gives pressures outside of 300 to 1250 hPa", _AGAIN),
