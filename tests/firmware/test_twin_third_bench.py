@@ -41,7 +41,12 @@ def begin(bench: Bench, *faults: str) -> None:
 
 def wrong_values(found: list[m.Message], invalid: int = -32768) -> list[m.Message]:
     """Messages with a value that no part has measured."""
-    right = {"Gyros": {GYROS, invalid}, "Motion": {*RATES, *FORCES, invalid}, "Magnetic": set(FIELD), "Pressure": set(PRESSURE)}
+    right = {
+        "Gyros": {GYROS, invalid},
+        "Motion": {*RATES, *FORCES, invalid},
+        "Magnetic": set(FIELD),
+        "Pressure": set(PRESSURE),
+    }
     return [x for x in found if not set(x[1:]) <= right.get(type(x).__name__, set(x[1:]))]
 
 
@@ -86,7 +91,11 @@ def test_wrong_coefficients_of_the_bmp390_are_read_again(bench: Bench, errors: i
 
 def test_wrong_coefficients_have_words(bench: Bench) -> None:
     begin(bench, "kit=2026", "bmp390=empty")
-    assert [x for x in findings_of(bench) if x.startswith("barometer (BMP390): its calibration reads with a wrong check sum")]
+    assert [
+        x
+        for x in findings_of(bench)
+        if x.startswith("barometer (BMP390): its calibration reads with a wrong check sum")
+    ]
 
 
 @pytest.mark.parametrize("errors", [100, 300])
