@@ -150,11 +150,10 @@ def killed_by(right: Sent, mutant: Sent) -> str:
         was, now = right.counts.get(kind, 0), mutant.counts.get(kind, 0)
         if abs(now - was) > LEAST_MESSAGES * was:
             return f"message: {now} {kind}, should be {was}"
-    for name, was in right.values.items():
-        now = mutant.values.get(name, was)
-        for k, what in enumerate(("median", "spread")):
-            if abs(now[k] - was[k]) > COUNTS + SHARE * np.abs(was).max():
-                return f"{what}: {name} {now[k]:.0f}, should be {was[k]:.0f}"
+    for name, pair in right.values.items():
+        for what, good, bad in zip(("median", "spread"), pair, mutant.values.get(name, pair), strict=True):
+            if abs(bad - good) > COUNTS + SHARE * np.abs(pair).max():
+                return f"{what}: {name} {bad:.0f}, should be {good:.0f}"
     return ""
 
 
