@@ -10,7 +10,7 @@ import textwrap
 
 from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
-COMMENT_WIDTH = 130  # as in the hand-written C
+COMMENT_WIDTH = 120  # as in the hand-written C
 
 
 def c_header(messages: list[Message]) -> str:
@@ -30,7 +30,7 @@ def _constants(messages: list[Message]) -> list[str]:
     markers = {name: marker for m in messages for name, marker in m.invalid_markers.items()}
     return [
         f"/* {LICENCE} */",
-        f"/* Messages of the board link: structs, packers, unpackers. {NOTICE} */",
+        f"/* Messages of the board link. {NOTICE} */",
         "#ifndef ECHOSTEP_MESSAGES_H",
         "#define ECHOSTEP_MESSAGES_H",
         "",
@@ -68,21 +68,24 @@ def _signature(message: Message) -> str:
     return f"bool msg_unpack_{name}(struct msg_{name} *m, const uint8_t *in, uint8_t length)"
 
 
-PUT = """
-static uint8_t *put8(uint8_t *out, uint8_t v)
-{
-	*out++ = v;
-	return out;
-}
+PACK = """
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error the messages are copied with their least byte first
+#endif
 
-static uint8_t *put16(uint8_t *out, uint16_t v)
+/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero. Returns the bytes. */
+static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 {
-	return put8(put8(out, (uint8_t)(v & 0xFFu)), (uint8_t)(v >> 8));
-}
-
-static uint8_t *put32(uint8_t *out, uint32_t v)
-{
-	return put16(put16(out, (uint16_t)(v & 0xFFFFu)), (uint16_t)(v >> 16));
+	const uint8_t *in = m;
+	uint8_t length = 0, at = 0, size;
+	while ((size = flash_byte(sizes++)) != 0) {
+		uint8_t alignment = size == 4u ? _Alignof(uint32_t) : size == 2u ? _Alignof(uint16_t) : 1u;
+		while (at % alignment)
+			at++;
+		while (size--)
+			out[length++] = in[at++];
+	}
+	return length;
 }
 """
 GET16 = """
@@ -96,7 +99,8 @@ static uint16_t get16(const uint8_t *in)
 def c_code(messages: list[Message]) -> str:
     """firmware/messages.c."""
     reads_16_bits = any(f.size == 2 for m in messages if m.direction == "host" for f in m.fields)
-    text = f'/* {LICENCE} */\n/* {NOTICE} */\n#include "messages.h"\n' + PUT + (GET16 if reads_16_bits else "")
+    includes = '#include "messages.h"\n#include "board.h" /* tables in flash */\n'
+    text = f"/* {LICENCE} */\n/* {NOTICE} */\n" + includes + PACK + (GET16 if reads_16_bits else "")
     for message in (m for m in messages if m.fields):
         body = _pack(message) if message.direction == "board" else _unpack(message)
         text += "\n".join(["", _signature(message), "{", *body, "}"]) + "\n"
@@ -104,11 +108,8 @@ def c_code(messages: list[Message]) -> str:
 
 
 def _pack(message: Message) -> list[str]:
-    lines = ["\tuint8_t *end = out;"]
-    for field in message.fields:
-        value = f"(uint16_t)m->{field.name}" if field.wire.signed else f"m->{field.name}"
-        lines.append(f"\tend = put{8 * field.size}(end, {value});")
-    return [*lines, "\treturn (uint8_t)(end - out);"]
+    sizes = ", ".join(str(field.size) for field in message.fields)
+    return [f"\tstatic const uint8_t sizes[] FLASH = {{ {sizes}, 0 }};", "\treturn pack(out, m, sizes);"]
 
 
 def _unpack(message: Message) -> list[str]:
