@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "bmp390.h"
+#include <math.h>          /* ldexpf */
 #include <string.h>        /* memcmp */
 #include "board.h"         /* spi_* */
 #include "configuration.h" /* mode */
@@ -45,7 +46,11 @@
 static enum spi_protocol protocol; /* slow until the chip is known: an SCP1000 may be there */
 static bool measuring;
 static uint32_t earliest, deadline; /* of the next sample, ticks */
-static float t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11; /* PAR_T1 ... PAR_P11 [8.4] */
+enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS }; /* PAR_T1 ... PAR_P11 [8.4] */
+#define OF_ONE_BYTE (1u << T3 | 1u << P3 | 1u << P4 | 1u << P7 | 1u << P8 | 1u << P10 | 1u << P11)
+#define UNSIGNED (1u << T1 | 1u << T2 | 1u << P5 | 1u << P6)
+#define WITH_OFFSET (1u << P1 | 1u << P2)
+static float par[PARAMETERS];
 
 /* The first byte of a reply is a dummy. */
 static void read(uint8_t address, uint8_t *bytes, uint8_t length)
@@ -90,21 +95,6 @@ uint32_t bmp390_start(uint32_t now)
 	return now + RESET_TICKS;
 }
 
-static float u16(const uint8_t *bytes)
-{
-	return (float)(uint16_t)(bytes[0] | (uint16_t)bytes[1] << 8);
-}
-
-static float s16(const uint8_t *bytes)
-{
-	return (float)(int16_t)(uint16_t)(bytes[0] | (uint16_t)bytes[1] << 8);
-}
-
-static float s8(uint8_t byte)
-{
-	return (float)(int8_t)byte;
-}
-
 static uint8_t checksum(const uint8_t *bytes, uint8_t length)
 {
 	uint8_t crc = 0xFF;
@@ -116,42 +106,43 @@ static uint8_t checksum(const uint8_t *bytes, uint8_t length)
 	return (uint8_t)~crc;
 }
 
-/* The scales of the coefficients [8.4]; false: their checksum is wrong. */
+/* The coefficients in their order and their scales [8.4]; false: their checksum is wrong. */
 static bool read_coefficients(void)
 {
-	uint8_t bytes[1 + COEFFICIENTS_SIZE], *c = bytes + 1;
+	static const uint8_t powers[PARAMETERS] FLASH = { /* of two, negated */
+		[T1] = (uint8_t)-8, [T2] = 30, [T3] = 48, [P1] = 20, [P2] = 29, [P3] = 32, [P4] = 37, [P5] = (uint8_t)-3, [P6] = 6,
+		[P7] = 8, [P8] = 15, [P9] = 48, [P10] = 48, [P11] = 65,
+	};
+	uint8_t bytes[1 + COEFFICIENTS_SIZE];
+	const uint8_t *next = bytes + 1;
 	read(REGISTER_CHECKSUM, bytes, sizeof bytes);
-	t1 = u16(c) * 0x1p8f;
-	t2 = u16(c + 2) * 0x1p-30f;
-	t3 = s8(c[4]) * 0x1p-48f;
-	p1 = (s16(c + 5) - 0x1p14f) * 0x1p-20f;
-	p2 = (s16(c + 7) - 0x1p14f) * 0x1p-29f;
-	p3 = s8(c[9]) * 0x1p-32f;
-	p4 = s8(c[10]) * 0x1p-37f;
-	p5 = u16(c + 11) * 0x1p3f;
-	p6 = u16(c + 13) * 0x1p-6f;
-	p7 = s8(c[15]) * 0x1p-8f;
-	p8 = s8(c[16]) * 0x1p-15f;
-	p9 = s16(c + 17) * 0x1p-48f;
-	p10 = s8(c[19]) * 0x1p-48f;
-	p11 = s8(c[20]) * 0x1p-65f;
-	return bytes[0] == checksum(c, COEFFICIENTS_SIZE);
+	for (uint8_t k = 0; k < PARAMETERS; k++) {
+		uint16_t bit = (uint16_t)1 << k;
+		int16_t word = (int8_t)*next++;
+		if (!(bit & OF_ONE_BYTE))
+			word = (int16_t)((uint8_t)word | (uint16_t)*next++ << 8);
+		float value = bit & UNSIGNED ? (float)(uint16_t)word : (float)word;
+		if (bit & WITH_OFFSET)
+			value -= 0x1p14f;
+		par[k] = ldexpf(value, -(int8_t)flash_byte(&powers[k]));
+	}
+	return bytes[0] == checksum(bytes + 1, COEFFICIENTS_SIZE);
 }
 
 /* Temperature in degC [8.5]. */
 static float temperature_of(uint32_t raw)
 {
-	float d = (float)raw - t1;
-	return d * t2 + d * d * t3;
+	float d = (float)raw - par[T1];
+	return d * par[T2] + d * d * par[T3];
 }
 
 /* Pressure in Pa at temperature t [8.6]; 24-bit mantissas cost up to 0.1 Pa. */
 static float pressure_of(uint32_t raw, float t)
 {
 	float r = (float)raw;
-	float offset = p5 + t * (p6 + t * (p7 + t * p8));
-	float slope = p1 + t * (p2 + t * (p3 + t * p4));
-	return offset + r * (slope + r * (p9 + t * p10 + r * p11));
+	float offset = par[P5] + t * (par[P6] + t * (par[P7] + t * par[P8]));
+	float slope = par[P1] + t * (par[P2] + t * (par[P3] + t * par[P4]));
+	return offset + r * (slope + r * (par[P9] + t * par[P10] + r * par[P11]));
 }
 
 static void await_sample(uint32_t now)
