@@ -34,7 +34,8 @@
 #define NO_REPLY 0xFFu       /* MISO is pulled up: an absent chip reads as ones */
 
 #define RESET_TICKS (10u * TICKS_PER_MS) /* start-up takes 2 ms */
-#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 80 ms per sample: one that is ready earlier is a stuck flag */
+/* the fast mode needs 80 ms per sample: one that is ready earlier is a stuck flag */
+#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS)
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)
 
 #define COEFFICIENTS_SIZE 21u
@@ -74,7 +75,8 @@ static void write8(uint8_t address, uint8_t value)
 	spi_write(CHIP_PRESSURE, protocol, address, value);
 }
 
-/* An SCP1000 takes both reads for the same register, so that two different bytes are not from it. The write has no effect on it. */
+/* An SCP1000 takes both reads for the same register, so that two different bytes are not from it. The write has no
+ * effect on it. */
 bool bmp390_answers(void)
 {
 	protocol = SPI_SCP1000;
@@ -101,7 +103,7 @@ static uint8_t checksum(const uint8_t *bytes, uint8_t length)
 	while (length--) {
 		crc ^= *bytes++;
 		for (uint8_t n = 0; n < 8; n++)
-			crc = (uint8_t)((uint8_t)(crc << 1) ^ (crc & 0x80u ? CRC_POLYNOMIAL : 0u));
+			crc = (uint8_t)((uint8_t)(crc << 1) ^ (crc >> 7) * CRC_POLYNOMIAL);
 	}
 	return (uint8_t)~crc;
 }
@@ -110,8 +112,8 @@ static uint8_t checksum(const uint8_t *bytes, uint8_t length)
 static bool read_coefficients(void)
 {
 	static const uint8_t powers[PARAMETERS] FLASH = { /* of two, negated */
-		[T1] = (uint8_t)-8, [T2] = 30, [T3] = 48, [P1] = 20, [P2] = 29, [P3] = 32, [P4] = 37, [P5] = (uint8_t)-3, [P6] = 6,
-		[P7] = 8, [P8] = 15, [P9] = 48, [P10] = 48, [P11] = 65,
+		[T1] = (uint8_t)-8, [T2] = 30, [T3] = 48, [P1] = 20, [P2] = 29, [P3] = 32, [P4] = 37,
+		[P5] = (uint8_t)-3, [P6] = 6, [P7] = 8, [P8] = 15, [P9] = 48, [P10] = 48, [P11] = 65,
 	};
 	uint8_t bytes[1 + COEFFICIENTS_SIZE];
 	const uint8_t *next = bytes + 1;
@@ -121,7 +123,7 @@ static bool read_coefficients(void)
 		int16_t word = (int8_t)*next++;
 		if (!(bit & OF_ONE_BYTE))
 			word = (int16_t)((uint8_t)word | (uint16_t)*next++ << 8);
-		float value = bit & UNSIGNED ? (float)(uint16_t)word : (float)word;
+		float value = (bit & UNSIGNED) ? (float)(uint16_t)word : (float)word;
 		if (bit & WITH_OFFSET)
 			value -= 0x1p14f;
 		par[k] = ldexpf(value, -(int8_t)flash_byte(&powers[k]));
@@ -202,7 +204,8 @@ static uint8_t convert(const uint8_t *d, struct pressure_step *out)
 	return FAULT_NONE;
 }
 
-/* A sample has no checksum: it is read twice. Settings may have arrived with a wrong bit: they are read back, and written anew. */
+/* A sample has no checksum: it is read twice. Settings may have arrived with a wrong bit: they are read back, and
+ * written anew. */
 static uint8_t sample(uint32_t now, struct pressure_step *out)
 {
 	uint8_t d[2][DATA_SIZE];

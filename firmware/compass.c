@@ -102,7 +102,8 @@ static void prepare(uint32_t now)
 		lis3mdl_prepare(&transfer, LIS3MDL_IDENTITY, state == SEEK_SECOND);
 }
 
-/* Starts a transfer if the bus is free, and then sets the time of the next one: those of the search follow each other. */
+/* Starts a transfer if the bus is free, and then sets the time of the next one: those of the search follow each
+ * other. */
 static void begin(uint32_t now)
 {
 	prepare(now);

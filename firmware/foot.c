@@ -6,7 +6,8 @@
 #include "parts.h"         /* what was found */
 
 #define CHIP CHIP_THIGH
-#define SEEK_FIRST_TICKS (90u * TICKS_PER_MS) /* before the rangers' first slot: the left echo line is the data-ready line */
+/* before the rangers' first slot: the left echo line is the data-ready line */
+#define SEEK_FIRST_TICKS (90u * TICKS_PER_MS)
 #define SEEK_TICKS (200u * TICKS_PER_MS)      /* between two searches; a start takes 11 to 100 ms */
 #define RESET_TICKS (100u * TICKS_PER_MS)     /* start-up time [DS-000192, table 5] */
 #define FIRST_SAMPLE_TICKS (200u * TICKS_PER_MS) /* gyros need 35 ms */

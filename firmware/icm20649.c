@@ -38,7 +38,8 @@ static uint8_t read8(enum chip chip, uint8_t address)
 	return value;
 }
 
-/* When the processor was reset while it wrote settings, bank 2 is still selected, and has the divider at this address. */
+/* When the processor was reset while it wrote settings, bank 2 is still selected, and has the divider at this
+ * address. */
 uint8_t icm20649_identity(enum chip chip)
 {
 	uint8_t identity = read8(chip, REGISTER_WHO_AM_I);
@@ -48,8 +49,9 @@ uint8_t icm20649_identity(enum chip chip)
 	return read8(chip, REGISTER_WHO_AM_I);
 }
 
-/* Two registers, since another part's reply may be like one of them by chance, and five times, since that of an idle line may be like both. Of
- * the second one only the bits that are always zero count: a frame for another part may have written the rest. */
+/* Two registers, since another part's reply may be like one of them by chance, and five times, since that of an idle
+ * line may be like both. Of the second one only the bits that are always zero count: a frame for another part may have
+ * written the rest. */
 bool icm20649_answers(enum chip chip)
 {
 	for (uint8_t n = 0; n < PROOFS; n++) {

@@ -30,7 +30,8 @@ void icm20649_start(enum chip chip);
 /* Whether all settings are as written (0.3 ms). */
 bool icm20649_is_set(enum chip chip);
 
-/* The newest sample, read twice (0.3 ms), since it has no checksum. FAULT_NO_ANSWER: the part is not there; FAULT_BAD_VALUE: the two differ. */
+/* The newest sample, read twice (0.3 ms), since it has no checksum. FAULT_NO_ANSWER: the part is not there;
+ * FAULT_BAD_VALUE: the two differ. */
 uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out);
 
 #endif

@@ -5,7 +5,8 @@
 
 #include "board.h" /* struct twi_transfer */
 
-/* The transfers that find and start it, one after the other, then those that read its settings back, and its samples. */
+/* The transfers that find and start it, one after the other, then those that read its settings back, and its
+ * samples. */
 enum lis3mdl_step { LIS3MDL_IDENTITY, LIS3MDL_SETTINGS, LIS3MDL_MORE_SETTINGS, LIS3MDL_CHECK, LIS3MDL_SAMPLE };
 
 /* The transfer of a step; `second`: at the chip's other address. */

@@ -9,7 +9,8 @@
 #define REGISTER_CTRL3_C 0x12u
 #define REGISTER_CTRL5_C 0x14u
 #define REGISTER_CTRL9_XL 0x18u
-#define REGISTER_STATUS 0x1Eu /* then a reserved one, then temperature, gyros, accelerometers: 16 bits each, low byte first */
+/* then a reserved one, then temperature, gyros, accelerometers: 16 bits each, low byte first */
+#define REGISTER_STATUS 0x1Eu
 #define READ_FLAG 0x80u
 #define STATUS_RATE_READY 0x02u
 #define STATUS_ZEROS 0xF8u /* bits of STATUS that are always zero; what the reserved register reads is not said */
@@ -30,8 +31,8 @@
 #define PROVING 2u /* registers of such an answer */
 
 static const uint8_t settings[] FLASH = { /* from INT2_CTRL on */
-	0, LSM6DSO_IDENTITY, CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES, CTRL4_C_SPI_ONLY_FILTER, 0,
-	CTRL6_C_50_HZ, 0, CTRL8_XL_83_HZ, CTRL9_XL_I3C_OFF,
+	0, LSM6DSO_IDENTITY, CTRL1_XL_1667_HZ_8_G, CTRL2_G_1667_HZ_1000_DPS, CTRL3_C_WHOLE_SAMPLES,
+	CTRL4_C_SPI_ONLY_FILTER, 0, CTRL6_C_50_HZ, 0, CTRL8_XL_83_HZ, CTRL9_XL_I3C_OFF,
 };
 
 /* Whether the first registers of the settings are as they must be. */
@@ -45,9 +46,10 @@ static bool has_settings(enum chip chip, uint8_t count)
 	return equal;
 }
 
-/* An ADIS16100 that takes the 24 clocks of a reading for a frame returns another second byte than a zero, or the same byte twice; the writes
- * have no effect on it. While I3C is on, frames for others may have confused a part: its identity then reads 0 [STMicroelectronics/stm32-lsm6dso,
- * issue 1]. A wrong bit may have left it with three wires, or with addresses that do not count up. */
+/* An ADIS16100 that takes the 24 clocks of a reading for a frame returns another second byte than a zero, or the same
+ * byte twice; the writes have no effect on it. While I3C is on, frames for others may have confused a part: its
+ * identity then reads 0 [STMicroelectronics/stm32-lsm6dso, issue 1]. A wrong bit may have left it with three wires, or
+ * with addresses that do not count up. */
 bool lsm6dso_answers(enum chip chip)
 {
 	spi_write(chip, SPI_MODE3, REGISTER_CTRL9_XL, CTRL9_XL_I3C_OFF);
@@ -92,7 +94,8 @@ static uint8_t read_once(enum chip chip, struct lsm6dso_sample *out)
 	return flags;
 }
 
-/* Between two readings the part may have measured rates or forces anew; each at most once within four readings, which take 0.6 ms. */
+/* Between two readings the part may have measured rates or forces anew; each at most once within four readings, which
+ * take 0.6 ms. */
 uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
 {
 	struct lsm6dso_sample before;
@@ -114,6 +117,8 @@ uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out)
 
 void lsm6dso_excite(enum chip chip, enum excitation excitation)
 {
-	spi_write(chip, SPI_MODE3, REGISTER_CTRL2_G, excitation == EXCITE_NONE ? CTRL2_G_1667_HZ_1000_DPS : CTRL2_G_1667_HZ_2000_DPS);
-	spi_write(chip, SPI_MODE3, REGISTER_CTRL5_C, excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0);
+	uint8_t range = excitation == EXCITE_NONE ? CTRL2_G_1667_HZ_1000_DPS : CTRL2_G_1667_HZ_2000_DPS;
+	uint8_t sign = excitation == EXCITE_ST1 ? CTRL5_C_NEGATIVE : excitation == EXCITE_ST2 ? CTRL5_C_POSITIVE : 0;
+	spi_write(chip, SPI_MODE3, REGISTER_CTRL2_G, range);
+	spi_write(chip, SPI_MODE3, REGISTER_CTRL5_C, sign);
 }

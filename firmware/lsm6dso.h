@@ -25,11 +25,12 @@ void lsm6dso_start(enum chip chip);
 /* Whether all settings are as written (0.1 ms); not while it is excited. */
 bool lsm6dso_is_set(enum chip chip);
 
-/* The newest sample (0.3 to 0.6 ms); FAULT_NO_ANSWER: the chip is not there, FAULT_NEVER_READY: it has none, FAULT_BAD_VALUE: wrong bits. */
+/* The newest sample (0.3 to 0.6 ms); FAULT_NO_ANSWER: the chip is not there, FAULT_NEVER_READY: it has none,
+ * FAULT_BAD_VALUE: wrong bits. */
 uint8_t lsm6dso_read(enum chip chip, struct lsm6dso_sample *out);
 
-/* Its self-test: ST1 of negative sign, ST2 of positive sign. While it is excited, a count of its rates is 0.07 deg/s: the data sheet's limits
- * are those of 2000 deg/s. */
+/* Its self-test: ST1 of negative sign, ST2 of positive sign. While it is excited, a count of its rates is 0.07 deg/s:
+ * the data sheet's limits are those of 2000 deg/s. */
 void lsm6dso_excite(enum chip chip, enum excitation excitation);
 
 #endif

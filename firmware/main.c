@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until the earliest time
- * that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time happens here. */
+/* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until
+ * the earliest time that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time
+ * happens here. */
 #include "board.h"         /* start, clock, USB, sleep */
 #include "compass.h"       /* sensor */
 #include "configuration.h" /* carries out `configure` */

@@ -65,7 +65,8 @@ uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m)
 
 uint8_t msg_pack_status(uint8_t *out, const struct msg_status *m)
 {
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 2, 0 };
+	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1,
+		2, 0 };
 	return pack(out, m, sizes);
 }
 

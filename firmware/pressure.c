@@ -9,12 +9,14 @@
 
 #define RETRY_TICKS TICKS_PER_S          /* from a failure to the next search */
 #define POLL_TICKS (5u * TICKS_PER_MS)   /* between two steps of a driver */
-#define START_UP_TICKS (150u * TICKS_PER_MS) /* when the LSM6DSO have I3C off, which frames for a barometer may confuse; a BMP390 takes 2 ms */
+/* when the LSM6DSO have I3C off, which frames for a barometer may confuse; a BMP390 takes 2 ms */
+#define START_UP_TICKS (150u * TICKS_PER_MS)
 
 static enum { SEARCHING, RUNS_SCP1000, RUNS_BMP390 } state;
 static uint32_t due; /* next step, ticks */
 
-/* The BMP390 is sought first: the SCP1000 takes its frames for reads, while some writes to an SCP1000 would reconfigure a BMP390. */
+/* The BMP390 is sought first: the SCP1000 takes its frames for reads, while some writes to an SCP1000 would reconfigure
+ * a BMP390. */
 static uint32_t search(uint32_t now)
 {
 	if (bmp390_answers()) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The barometer: finds which one is on its chip select, starts it, starts it again after a failure; one `pressure` message per sample. */
+/* The barometer: finds which one is on its chip select, starts it, starts it again after a failure; one `pressure`
+ * message per sample. */
 #ifndef ECHOSTEP_PRESSURE_H
 #define ECHOSTEP_PRESSURE_H
 
@@ -16,7 +17,8 @@ uint32_t pressure_run(uint32_t now);
 struct pressure_step {
 	uint32_t pressure;   /* counts of 0.25 Pa; 0: this step has measured none */
 	int16_t temperature; /* counts of 0.05 degC */
-	bool wrong_bits;     /* its settings or two readings of a sample differed: there may be no pressure, and it goes on */
+	/* its settings or two readings of a sample differed: there may be no pressure, and it goes on */
+	bool wrong_bits;
 	uint8_t fault;       /* FAULT_*; not FAULT_NONE: the barometer must be sought anew */
 };
 

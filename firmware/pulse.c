@@ -3,15 +3,17 @@
 #include "board.h" /* capture_* */
 #include "parts.h" /* what was found */
 
-/* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the same at 3 to 5 V.
- * Modules with 70 and 200 ms without an echo have been measured.] The JSN-SR04T answers only 12 ms after its trigger. */
+/* [HC-SR04 user guide: a pulse of 150 us to 25 ms, or of 38 ms without an echo; a new ping every 60 ms. RCWL-1601: the
+ * same at 3 to 5 V. Modules with 70 and 200 ms without an echo have been measured.] The JSN-SR04T answers only 12 ms
+ * after its trigger. */
 #define ANSWER_MIN_TICKS (TICKS_PER_MS / 10u)         /* from the trigger to the rising edge */
 #define ANSWER_MAX_TICKS (15u * TICKS_PER_MS)
 #define PROOFS 8u                              /* answers in a row by which a module is known, each within */
 #define SPREAD_TICKS (3u * TICKS_PER_MS / 10u) /* of the first */
 #define ECHO_MAX_TICKS (53u * TICKS_PER_MS / 2u)      /* 4.5 m, out and back: a longer pulse is one without an echo */
 #define TICKS_PER_US 2u
-#define GHOST_MAX_US 700u /* 12 cm: many modules answer the ping after one without an echo with 4 to 9 cm [forum.arduino.cc 429576, 337199] */
+/* 12 cm: many modules answer the ping after one without an echo with 4 to 9 cm [forum.arduino.cc 429576, 337199] */
+#define GHOST_MAX_US 700u
 #define POLL_TICKS TICKS_PER_MS
 
 static uint16_t firsts[2]; /* ticks from trigger to answer, of the first of these: */
@@ -23,7 +25,8 @@ bool pulse_begin(uint8_t side, struct ranging *r)
 	return capture_trigger(side);
 }
 
-/* Whether answers come so evenly after their triggers as those of a module: edges on an open line do not. `delay`: of this one. */
+/* Whether answers come so evenly after their triggers as those of a module: edges on an open line do not. `delay`: of
+ * this one. */
 static bool prove(uint8_t side, uint16_t delay, uint8_t *fault)
 {
 	uint16_t off = (uint16_t)(delay - firsts[side] + SPREAD_TICKS);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The two input captures, each with its line: PD4 (Timer1), which is SyncOut or the data-ready line of a foot board, or the left echo line; and
- * PC7 (Timer3, at the same rate), the right echo line. A ping owns its line from the trigger to the end of the pulse, else the line's edges
- * are SyncOut's. Triggers are on PF5 (left) and PF4 (right). A capture has no jitter but the timers' half microsecond, however late its
- * interrupt is. */
+/* The two input captures, each with its line: PD4 (Timer1), which is SyncOut or the data-ready line of a foot board, or
+ * the left echo line; and PC7 (Timer3, at the same rate), the right echo line. A ping owns its line from the trigger to
+ * the end of the pulse, else the line's edges are SyncOut's. Triggers are on PF5 (left) and PF4 (right). A capture has
+ * no jitter but the timers' half microsecond, however late its interrupt is. */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */
 #include <avr/power.h>     /* switching on Timer3 */
@@ -47,7 +47,8 @@ static void await_edge(uint8_t side, bool rising)
 	}
 }
 
-/* The bootloader leaves PC7, the pin of its LED, as an output. Lines that nothing drives are pulled up, so that they do not follow the mains. */
+/* The bootloader leaves PC7, the pin of its LED, as an output. Lines that nothing drives are pulled up, so that they do
+ * not follow the mains. */
 void capture_start(void)
 {
 	DDRC &= (uint8_t)~LINE_RIGHT;
@@ -64,7 +65,8 @@ static void start_timer_3(void)
 	DDRF |= TRIGGER_LEFT | TRIGGER_RIGHT;
 	TCCR3A = 0;
 	TCCR3B = RISING_3;
-	ATOMIC_BLOCK(ATOMIC_RESTORESTATE) /* an interrupt between the two readings would shift all stamps of the right ranger */
+	/* an interrupt between the two readings would shift all stamps of the right ranger */
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		timer_3_behind = (uint16_t)(TCNT1 - TCNT3);
 	}

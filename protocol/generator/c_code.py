@@ -108,8 +108,9 @@ def c_code(messages: list[Message]) -> str:
 
 
 def _pack(message: Message) -> list[str]:
-    sizes = ", ".join(str(field.size) for field in message.fields)
-    return [f"\tstatic const uint8_t sizes[] FLASH = {{ {sizes}, 0 }};", "\treturn pack(out, m, sizes);"]
+    sizes = " ".join(f"{field.size}," for field in message.fields)
+    table = textwrap.wrap(f"static const uint8_t sizes[] FLASH = {{ {sizes} 0 }};", COMMENT_WIDTH - 8)
+    return [*("\t" + "\t" * (k > 0) + line for k, line in enumerate(table)), "\treturn pack(out, m, sizes);"]
 
 
 def _unpack(message: Message) -> list[str]:

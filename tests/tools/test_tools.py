@@ -64,16 +64,6 @@ def test_stages_of_a_replay_sum_up(tmp_path: Path, start: Start, capsys: pytest.
     assert ms["replay"] == pytest.approx(ms["bytes to legs and pings"] + ms["cloud and estimates"], abs=0.2)
 
 
-@pytest.mark.process
-def test_kills(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    for kills in (1, 2):
-        assert (
-            start("reliability.kill_recorder", "--kills", kills, "--longest", 0.3, "--out", tmp_path / "a.jsonl") == 0
-        )
-        assert capsys.readouterr().out.count("PASS") == 3
-    assert len((tmp_path / "a.jsonl").read_text().splitlines()) == 2
-
-
 def test_mutated_inputs_go_on_where_they_stopped(
     tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

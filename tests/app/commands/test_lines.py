@@ -22,6 +22,7 @@ import echostep
 from board_runs import ROOT, tool
 from command_line import PROGRAM
 from command_line import echostep as run
+from commands.line_player import lines
 from echostep.errors import EchostepError
 from echostep.localization import digest
 from echostep.ports.chunks import LINES, MTX
@@ -36,7 +37,6 @@ from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineR
 from foot.foot_walks import MANNERS, course, samples
 from free_ports import free_port
 from players import pseudo_terminal
-from twin.line_foot import lines
 from waiting import until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
@@ -120,7 +120,7 @@ def test_a_live_run_without_a_board_is_replayed_bit_for_bit(walk: Path, tmp_path
     walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
     plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
     live = ("live", "--foot", "lines:-", "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
-    with subprocess.Popen([*tool("twin.line_foot"), str(walk)], stdout=subprocess.PIPE) as device:
+    with subprocess.Popen([*tool("commands.line_player"), str(walk)], stdout=subprocess.PIPE) as device:
         done = subprocess.run(
             [*PROGRAM, *map(str, live)], check=False, stdin=device.stdout, capture_output=True, text=True
         )

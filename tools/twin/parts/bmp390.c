@@ -1,15 +1,19 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first, and a frame writes one byte.
+ * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first, and a
+ * frame writes one byte.
  *
- * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears it. The counts are
- * those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and temperature: found by bisection. */
+ * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears
+ * it. The counts are those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and
+ * temperature: found by bisection. */
 #include <math.h>
 #include <string.h>
 
 #include "parts/parts.h"
 
-enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, CONFIG = 0x1F, CHECKSUM = 0x30, COEFFICIENTS, CMD = 0x7E, REGISTERS = 0x80 };
-enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, BOTH = 3, THREE_WIRES = 1, SOFT_RESET = 0xB6 };
+enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, CONFIG = 0x1F };
+enum { CHECKSUM = 0x30, COEFFICIENTS, CMD = 0x7E, REGISTERS = 0x80 };
+enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, BOTH = 3 };
+enum { THREE_WIRES = 1, SOFT_RESET = 0xB6 };
 enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY };
 #define IDENTITY 0x60
 #define OTHER_IDENTITY 0x58 /* a BMP280 */
@@ -18,7 +22,9 @@ enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY };
 #define COEFFICIENTS_SIZE 21
 #define FULL_SCALE 0xFFFFFFu
 
-static struct register_file chips[] = { { .spi = { .part = PART(bmp390, PLACE_PRESSURE, "bmp390"), .port = 'D', .pin = 7 } } };
+static struct register_file chips[] = {
+	{ .spi = { .part = PART(bmp390, PLACE_PRESSURE, "bmp390"), .port = 'D', .pin = 7 } },
+};
 static uint8_t registers[REGISTERS];
 static double low_pass[2]; /* counts of pressure and temperature; 0: none yet */
 
@@ -28,9 +34,9 @@ static struct parameter {
 	int value, size, power;
 	double offset;
 } parameters[PARAMETERS] = {
-	{ 28159, 2, 8, 0 }, { 18902, 2, -30, 0 }, { -10, 1, -48, 0 }, { 773, 2, -20, 16384 }, { -1377, 2, -29, 16384 }, { 35, 1, -32, 0 },
-	{ 0, 1, -37, 0 }, { 25011, 2, 3, 0 }, { 30127, 2, -6, 0 }, { 3, 1, -8, 0 }, { -7, 1, -15, 0 }, { 16194, 2, -48, 0 }, { 6, 1, -48, 0 },
-	{ -60, 1, -65, 0 },
+	{ 28159, 2, 8, 0 }, { 18902, 2, -30, 0 }, { -10, 1, -48, 0 }, { 773, 2, -20, 16384 }, { -1377, 2, -29, 16384 },
+	{ 35, 1, -32, 0 }, { 0, 1, -37, 0 }, { 25011, 2, 3, 0 }, { 30127, 2, -6, 0 }, { 3, 1, -8, 0 }, { -7, 1, -15, 0 },
+	{ 16194, 2, -48, 0 }, { 6, 1, -48, 0 }, { -60, 1, -65, 0 },
 };
 
 static double par(int k)
@@ -84,6 +90,14 @@ static unsigned conversion_us(void)
 	return 234 + 392 + 2020 * pressure + 163 + 2020 * temperature;
 }
 
+/* Of normal mode; 0: asleep, or a conversion would be longer than its period [3.9.2]. */
+static avr_cycle_count_t period(void)
+{
+	avr_cycle_count_t cycles = FASTEST << registers[ODR];
+
+	return (registers[PWR_CTRL] & NORMAL) == NORMAL && US(conversion_us()) < cycles ? cycles : 0;
+}
+
 /* The low pass begins with the first sample [4.3.21]. */
 static uint32_t filtered(double *state, uint32_t raw)
 {
@@ -102,7 +116,7 @@ static avr_cycle_count_t sample(void *self)
 	put24(DATA + 3, raw);
 	if ((registers[PWR_CTRL] & BOTH) == BOTH)
 		registers[STATUS] |= PRESSURE_READY | TEMPERATURE_READY;
-	return FASTEST << registers[ODR];
+	return period();
 }
 
 /* As Bosch's example bmp3_selftest.c computes it. */
@@ -164,8 +178,8 @@ static void set(void *self, uint8_t at, uint8_t value)
 	if (at < IF_CONF || at >= CHECKSUM) /* read only */
 		return;
 	registers[at] = value;
-	if (at >= PWR_CTRL && at <= ODR) /* settings whose conversion is longer than its period are refused [3.9.2] */
-		part_sample_after(self, (registers[PWR_CTRL] & NORMAL) == NORMAL && US(conversion_us()) < FASTEST << registers[ODR] ? FASTEST << registers[ODR] : 0);
+	if (at >= PWR_CTRL && at <= ODR)
+		part_sample_after(self, period());
 }
 
 static int exchange(void *self, uint8_t sent)

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * ICM-20649 of a foot board, at the thigh's chip select (PB4), INT1 on PD4 [ICM-20649 data sheet DS-000192]: SPI mode 0 or 3, at most 7 MHz;
- * four user banks. Rates of 4000 deg/s have 8.2 counts per deg/s, forces of 30 g 1024 per g; other ranges are scaled from those. The low passes,
- * of first order here, have the bandwidths that are set [tables 16 and 18].
+ * ICM-20649 of a foot board, at the thigh's chip select (PB4), INT1 on PD4 [ICM-20649 data sheet DS-000192]: SPI mode 0
+ * or 3, at most 7 MHz; four user banks. Rates of 4000 deg/s have 8.2 counts per deg/s, forces of 30 g 1024 per g; other
+ * ranges are scaled from those. The low passes, of first order here, have the bandwidths that are set [tables 16 and
+ * 18].
  *
- * The counts are those of the row's thigh, between this millisecond's and the one before, at the moment of the sample by the part's own clock.
- * No FIFO: the program reads the registers of the newest sample, and one that is not read in time is overwritten. */
+ * The counts are those of the row's thigh, between this millisecond's and the one before, at the moment of the sample
+ * by the part's own clock. No FIFO: the program reads the registers of the newest sample, and one that is not read in
+ * time is overwritten. */
 #include <math.h>
 #include <string.h>
 
@@ -12,7 +14,8 @@
 
 #include "parts/parts.h"
 
-enum { WHO_AM_I = 0x00, PWR_MGMT_1 = 0x06, INT_ENABLE_1 = 0x11, INT_STATUS_1 = 0x1A, OUT = 0x2D, BANK_SEL = 0x7F, REGISTERS = 0x80, BANKS = 4 };
+enum { WHO_AM_I = 0x00, PWR_MGMT_1 = 0x06, INT_ENABLE_1 = 0x11, INT_STATUS_1 = 0x1A, OUT = 0x2D, BANK_SEL = 0x7F };
+enum { REGISTERS = 0x80, BANKS = 4 };
 enum { GYRO_SMPLRT_DIV = 0x00, GYRO_CONFIG_1 = 0x01, ACCEL_SMPLRT_DIV_2 = 0x11, ACCEL_CONFIG = 0x14 }; /* of bank 2 */
 enum { DEVICE_RESET = 0x80, SLEEP = 0x40, CLOCK = 7, CLOCK_STOPPED = 7, RAW_DATA_READY = 1, LOW_PASS = 1 };
 enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK_READY, STUCK, SATURATED };
@@ -26,7 +29,9 @@ enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK_READY, STUCK, SA
 #define FULL_SCALE 32767
 #define FULL_SCALE_30_G 30720
 
-static struct register_file chips[] = { { .spi = { .part = PART(icm20649, PLACE_FOOT, "icm20649"), .port = 'B', .pin = 4 } } };
+static struct register_file chips[] = {
+	{ .spi = { .part = PART(icm20649, PLACE_FOOT, "icm20649"), .port = 'B', .pin = 4 } },
+};
 static uint8_t registers[BANKS][REGISTERS], out[14];
 static uint8_t bank;
 static bool sampling;

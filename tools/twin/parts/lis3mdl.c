@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * LIS3MDL magnetometer on I2C at 0x1C [LIS3MDL data sheet]: a sub-address whose upper bit makes the addresses count up; it measures at the rate, in
- * the range and in the order of bytes that are set. The counts are the row's field, at 4 gauss. */
+ * LIS3MDL magnetometer on I2C at 0x1C [LIS3MDL data sheet]: a sub-address whose upper bit makes the addresses count up;
+ * it measures at the rate, in the range and in the order of bytes that are set. The counts are the row's field, at 4
+ * gauss. */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +15,9 @@ enum { WRONG_IDENTITY = OTHER_TWI_FAULTS, NEVER_READY, SATURATED };
 #define FIRST_SAMPLE US(12500)
 #define FULL_SCALE 32767
 
-static struct register_file chips[] = { { .twi = { .part = PART(lis3mdl, PLACE_COMPASS, "lis3mdl"), .address = 0x1C } } };
+static struct register_file chips[] = {
+	{ .twi = { .part = PART(lis3mdl, PLACE_COMPASS, "lis3mdl"), .address = 0x1C } },
+};
 static uint8_t registers[REGISTERS];
 static avr_cycle_count_t ready_at;
 static uint64_t measured; /* number of the newest measurement since then */

@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Three LSM6DSO on the chip selects of the ADIS16100 [LSM6DSO data sheet DS12140]: SPI mode 0 or 3, at most 10 MHz. Gyros of 1000 deg/s give
- * 0.035 deg/s per count, those of other ranges in proportion; accelerometers of 8 g 0.244 mg.
+ * Three LSM6DSO on the chip selects of the ADIS16100 [LSM6DSO data sheet DS12140]: SPI mode 0 or 3, at most 10 MHz.
+ * Gyros of 1000 deg/s give 0.035 deg/s per count, those of other ranges in proportion; accelerometers of 8 g 0.244 mg.
  *
- * The self-test changes the rate by 150 to 700 deg/s at 2000 deg/s and by 20 to 80 at 250 [page 10]; between them in proportion to the range.
+ * The self-test changes the rate by 150 to 700 deg/s at 2000 deg/s and by 20 to 80 at 250 [page 10]; between them in
+ * proportion to the range.
  *
- * A rate is ready 70 ms after the gyros are switched on. Both sensors measure at their output rates; what is read is the row under way when the
- * first STATUS after a measurement is read. The axes are those that the extended rows have; a plain row has the rate about z only, and a part that
- * lies still otherwise. */
+ * A rate is ready 70 ms after the gyros are switched on. Both sensors measure at their output rates; what is read is
+ * the row under way when the first STATUS after a measurement is read. The axes are those that the extended rows have;
+ * a plain row has the rate about z only, and a part that lies still otherwise. */
 #include <math.h>
 #include <string.h>
 
 #include "parts/parts.h"
 
-enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL4_C, CTRL5_C, CTRL6_C, CTRL8_XL = 0x17, CTRL9_XL, STATUS = 0x1E, RESERVED, OUT_TEMP, REGISTERS = 0x80 };
+enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL4_C, CTRL5_C, CTRL6_C, CTRL8_XL = 0x17, CTRL9_XL };
+enum { STATUS = 0x1E, RESERVED, OUT_TEMP, REGISTERS = 0x80 };
 enum { ADDRESSES_COUNT_UP = 4, THREE_WIRES = 8, GYROS_SLEEP = 0x40, LPF1 = 2, I3C_OFF = 2 };
 enum { RATES, FORCES, SENSORS };
 static const struct {
@@ -63,9 +65,10 @@ static double full_scale_g(const struct imu *u)
 
 static double hertz(const struct imu *u, int sensor)
 {
+	bool asleep = sensor == RATES && (u->registers[CTRL4_C] & GYROS_SLEEP);
 	int code = u->registers[sensors[sensor].control] >> 4;
 
-	return code == 0 || (sensor == RATES && (u->registers[CTRL4_C] & GYROS_SLEEP)) ? 0.0 : ldexp(SLOWEST_HERTZ, code - 1);
+	return asleep || code == 0 ? 0.0 : ldexp(SLOWEST_HERTZ, code - 1);
 }
 
 /* Counts of 0.035 deg/s that the self-test adds in the end: ST_G 01 of positive, 11 of negative sign. */
@@ -83,8 +86,8 @@ static double excitation(const struct imu *u)
 	return target(u) + (u->excited - target(u)) * exp(-(double)(avr->cycle - u->excited_at) / 16e6 / FILTER_S);
 }
 
-/* Low pass: of the accelerometers half the output rate, or with LPF2 its share by HPCF_XL; of the gyros LPF1 by FTYPE, at 1.67 kHz [chapter 9,
- * CTRL1_XL and CTRL8_XL, CTRL6_C; half the output rate and the gyros' from memory]. */
+/* Low pass: of the accelerometers half the output rate, or with LPF2 its share by HPCF_XL; of the gyros LPF1 by FTYPE,
+ * at 1.67 kHz [chapter 9, CTRL1_XL and CTRL8_XL, CTRL6_C; half the output rate and the gyros' from memory]. */
 static double cut_hertz(const struct imu *u, int sensor)
 {
 	static const double shares[8] = { 4.0, 10.0, 20.0, 45.0, 100.0, 200.0, 400.0, 800.0 };
@@ -120,10 +123,10 @@ static void measure(struct imu *u, int sensor)
 
 	put(u, OUT_TEMP, (input.row.temperature / 20.0 - 25.0) * 256.0);
 	for (int k = 0; k < 3; k++) {
-		double rate = fault == SATURATED ? 1e6 : (a->rate[k] + excitation(u) + vibration(u, RATES)) * 1000.0 / full_scale_dps(u);
+		double rate = (a->rate[k] + excitation(u) + vibration(u, RATES)) * 1000.0 / full_scale_dps(u);
 		double force = (a->force[k] + vibration(u, FORCES)) * 8.0 / full_scale_g(u);
 
-		put(u, sensors[sensor].out + 2 * k, sensor == RATES ? rate : force);
+		put(u, sensors[sensor].out + 2 * k, sensor == FORCES ? force : fault == SATURATED ? 1e6 : rate);
 	}
 }
 
@@ -205,7 +208,8 @@ static void power(void *self)
 	memset(u->registers, 0, STATUS);
 	u->registers[CTRL3_C] = ADDRESSES_COUNT_UP;
 	u->registers[CTRL9_XL] = 0xE0;
-	if (!u->response && part_is_plugged(self)) /* drawn when it is first plugged in: a board of the papers is the same with and without this model */
+	/* drawn when it is first plugged in: a board of the papers is the same with and without this model */
+	if (!u->response && part_is_plugged(self))
 		u->response = 4600 + (int)random_below(15000); /* 161 to 686 deg/s */
 	u->file.up_at = avr->cycle + BOOT;
 	u->excited = 0.0;

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: its registers; the cable's side is in usb_transactions.c.
+ * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: its registers; the cable's side is in
+ * usb_transactions.c.
  *
- * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after every interrupt. */
+ * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after
+ * every interrupt. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>
@@ -15,7 +17,8 @@
 struct endpoint usb_endpoints[ENDPOINTS];
 static bool suspended; /* the bus is idle */
 FAULT_SWITCH(late_reset, "off on", NULL, 0)
-FAULT_SWITCH(suspend_repeats, "off on", NULL, 0) /* while the bus is idle the flag comes back at once: unknown of the silicon */
+/* while the bus is idle the flag comes back at once: unknown of the silicon */
+FAULT_SWITCH(suspend_repeats, "off on", NULL, 0)
 
 static struct endpoint *selected(void) { return &usb_endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
 static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A foot IMU that prints lines, played from a file: `python -m twin.line_foot IMU.csv | echostep live --foot lines:-`.
+"""A foot IMU that prints lines, played from a file: `line_player.py IMU.csv | echostep live --foot lines:-`.
 
 In: a CSV file of a foot IMU. Out: its lines on standard output at the pace of their times, the names of the columns each second. Owns nothing.
 """
