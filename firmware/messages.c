@@ -3,6 +3,11 @@
 #include "messages.h"
 #include "board.h" /* tables in flash */
 
+static uint16_t get16(const uint8_t *in)
+{
+	return (uint16_t)(in[0] | (uint16_t)in[1] << 8);
+}
+
 #if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
 #error the messages are copied with their least byte first
 #endif
@@ -22,119 +27,31 @@ static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 	return length;
 }
 
-static uint16_t get16(const uint8_t *in)
-{
-	return (uint16_t)(in[0] | (uint16_t)in[1] << 8);
-}
+#define PACKED(message, ...) \
+	uint8_t msg_pack_##message(uint8_t *out, const struct msg_##message *m) \
+	{ \
+		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0 }; \
+		return pack(out, m, sizes); \
+	}
 
-uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 4, 1, 1, 1, 1, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 1, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_pressure(uint8_t *out, const struct msg_pressure *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 4, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_compass(uint8_t *out, const struct msg_compass *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_status(uint8_t *out, const struct msg_status *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1,
-		2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_configuration(uint8_t *out, const struct msg_configuration *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 1, 1, 1, 1, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 2, 1, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_board_health(uint8_t *out, const struct msg_board_health *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 1, 1, 1, 2, 1, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_foot(uint8_t *out, const struct msg_foot *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 2, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 1, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 1, 1, 1, 1, 1, 1, 0 };
-	return pack(out, m, sizes);
-}
-
-uint8_t msg_pack_loop(uint8_t *out, const struct msg_loop *m)
-{
-	static const uint8_t sizes[] FLASH = { 4, 2, 2, 2, 0 };
-	return pack(out, m, sizes);
-}
+PACKED(identity, 4, 4, 1, 1, 1, 1)
+PACKED(ping, 4, 1, 1, 2)
+PACKED(gyros, 4, 2, 2, 2)
+PACKED(pressure, 4, 4, 2)
+PACKED(compass, 4, 2)
+PACKED(sync, 4, 2)
+PACKED(status, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 2)
+PACKED(clock_reply, 4, 2)
+PACKED(configuration, 4, 1, 1, 1, 1, 1)
+PACKED(gyro_health, 4, 1, 2, 1, 2, 2)
+PACKED(board_health, 4, 2, 2, 1, 1, 1, 2, 1)
+PACKED(parts, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1)
+PACKED(motion, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2)
+PACKED(magnetic, 4, 2, 2, 2)
+PACKED(foot, 4, 2, 2, 2, 2, 2, 2, 2)
+PACKED(foot_health, 4, 1, 1, 2, 2, 2)
+PACKED(electrical, 4, 1, 1, 1, 1, 1, 1)
+PACKED(loop, 4, 2, 2, 2)
 
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {

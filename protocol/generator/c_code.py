@@ -7,6 +7,7 @@ In: the messages between board and host. Out: C11 source. Owns nothing.
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable
 
 from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
@@ -17,12 +18,19 @@ def c_header(messages: list[Message]) -> str:
     """firmware/messages.h."""
     lines = _constants(messages)
     lines += ["", "enum {", *(f"\tMSG_{m.name.upper()} = 0x{m.id:02X}," for m in messages), "};"]
-    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()}_SIZE = {m.size}," for m in messages), "};"]
+    asked = [m for m in messages if m.direction == "host"]
+    lines += ["", *_enumeration(f"MSG_{m.name.upper()}_SIZE = {m.size}" for m in asked)]
     for name, (members, _) in enumerations(messages).items():
-        lines += ["", "enum {", *(f"\t{name.upper()}_{m.upper()} = {value}," for m, value in members.items()), "};"]
+        lines += _enumeration(f"{name.upper()}_{m.upper()} = {value}" for m, value in members.items())
     for message in messages:
         lines += _declaration(message)
     return "\n".join([*lines, "", "#endif"]) + "\n"
+
+
+def _enumeration(members: Iterable[str]) -> list[str]:
+    whole = ", ".join(member.replace(" ", "\0") for member in members)  # no line ends within a member
+    lines = textwrap.wrap(f"enum {{ {whole} }};", COMMENT_WIDTH - 3, subsequent_indent="\t")
+    return [line.replace("\0", " ") for line in lines]
 
 
 def _constants(messages: list[Message]) -> list[str]:
@@ -87,6 +95,14 @@ static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 	}
 	return length;
 }
+
+#define PACKED(message, ...) \\
+	uint8_t msg_pack_##message(uint8_t *out, const struct msg_##message *m) \\
+	{ \\
+		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0 }; \\
+		return pack(out, m, sizes); \\
+	}
+
 """
 GET16 = """
 static uint16_t get16(const uint8_t *in)
@@ -100,17 +116,16 @@ def c_code(messages: list[Message]) -> str:
     """firmware/messages.c."""
     reads_16_bits = any(f.size == 2 for m in messages if m.direction == "host" for f in m.fields)
     includes = '#include "messages.h"\n#include "board.h" /* tables in flash */\n'
-    text = f"/* {LICENCE} */\n/* {NOTICE} */\n" + includes + PACK + (GET16 if reads_16_bits else "")
-    for message in (m for m in messages if m.fields):
-        body = _pack(message) if message.direction == "board" else _unpack(message)
-        text += "\n".join(["", _signature(message), "{", *body, "}"]) + "\n"
+    text = f"/* {LICENCE} */\n/* {NOTICE} */\n" + includes + (GET16 if reads_16_bits else "") + PACK
+    text += "".join(map(_packed, (m for m in messages if m.direction == "board")))
+    for message in (m for m in messages if m.fields and m.direction == "host"):
+        text += "\n".join(["", _signature(message), "{", *_unpack(message), "}"]) + "\n"
     return text
 
 
-def _pack(message: Message) -> list[str]:
-    sizes = " ".join(f"{field.size}," for field in message.fields)
-    table = textwrap.wrap(f"static const uint8_t sizes[] FLASH = {{ {sizes} 0 }};", COMMENT_WIDTH - 8)
-    return [*("\t" + "\t" * (k > 0) + line for k, line in enumerate(table)), "\treturn pack(out, m, sizes);"]
+def _packed(message: Message) -> str:
+    sizes = "".join(f", {field.size}" for field in message.fields)
+    return "\n\t".join(textwrap.wrap(f"PACKED({message.name}{sizes})", COMMENT_WIDTH - 8)) + "\n"
 
 
 def _unpack(message: Message) -> list[str]:

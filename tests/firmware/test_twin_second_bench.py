@@ -209,24 +209,6 @@ def test_ghosts_of_the_schedules(bench: Bench, schedule: m.Schedule, crosses: bo
         )  # 1.5 ms: one transfer on the bus after the other
 
 
-@pytest.mark.parametrize("errors", [1, 3])
-def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None:
-    """N3: status bits and the reserved byte are known in every sample."""
-    begin(bench, "kit=2026", f"spi_errors={errors}")
-    bench.run(6_000, rows(6_000))
-    assert [text for text in findings_of(bench) if "(LSM6DSO): sent wrong bits" in text]
-
-
-def test_a_part_that_is_confused_by_i3c_answers_after_each_reset(bench: Bench) -> None:
-    """N5: after a reset of the processor alone, such a part's identity reads 0 until I3C is off."""
-    begin(bench, "kit=2026", "bootloader=none", *(f"imu_{place}=i3c" for place in ("thigh", "calf", "belt")))
-    for _ in range(3):
-        bench.fault("reset=external")
-        bench.run(2_500, rows(2_500))
-    gyros = m.Healthy.THIGH | m.Healthy.CALF | m.Healthy.BELT
-    assert bench.status.healthy & gyros == gyros
-
-
 def test_a_ghost_after_a_silence_is_a_silence(bench: Bench) -> None:
     """N6: the ping after one without an echo reads 8 cm; half of the pings that say "open" were lost to it."""
     begin(bench, "kit=2026", "pulse_left=ghost")

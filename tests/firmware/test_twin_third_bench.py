@@ -73,8 +73,12 @@ def test_a_reserved_register_may_read_anything(bench: Bench, value: int) -> None
 
 def test_a_part_that_is_confused_by_i3c_from_power_on_is_found(bench: Bench) -> None:
     """P3: its identity reads 0 until I3C is off, so I3C goes off first."""
-    begin(bench, "kit=2026", *(f"imu_{place}=i3c" for place in PLACES))
+    begin(bench, "kit=2026", "bootloader=none", *(f"imu_{place}=i3c" for place in PLACES))
     assert bench.status.healthy & ALL_IMUS == ALL_IMUS
+    for _ in range(3):  # N5: the same after resets of the processor alone
+        bench.fault("reset=external")
+        bench.run(2_500, rows(2_500))
+        assert bench.status.healthy & ALL_IMUS == ALL_IMUS
 
 
 @pytest.mark.parametrize("errors", [30, 100])
