@@ -164,15 +164,9 @@ class MtxReader:
         passed, waits = apply_gates(messages, self._limits, self._state, self._tally)
         self._waiting = messages.at(np.arange(waits, waits + 1)) if waits >= 0 else gates.NO_MESSAGES
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
-        return MtBatch(
-            counter,
-            values[:, mt.ACCEL],
-            values[:, mt.GYRO],
-            values[:, mt.MAG],
-            values[:, mt.ATTITUDE],
-            values[:, mt.CELSIUS],
-            end,
-        )
+        groups = (mt.ACCEL, mt.GYRO, mt.MAG, mt.ATTITUDE, mt.CELSIUS)
+        accel, gyro, mag, attitude, celsius = (values[:, group] for group in groups)
+        return MtBatch(counter, accel, gyro, mag, attitude, celsius, end)
 
     def _decode(self, frames: MtFrames) -> Messages:
         """Values of all measurement messages in order; other messages are counted."""
