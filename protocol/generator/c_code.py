@@ -17,9 +17,9 @@ COMMENT_WIDTH = 120  # as in the hand-written C
 def c_header(messages: list[Message]) -> str:
     """firmware/messages.h."""
     lines = _constants(messages)
-    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()} = 0x{m.id:02X}," for m in messages), "};"]
+    lines += ["", *_enumeration(f"MSG_{m.name.upper()} = 0x{m.id:02X}" for m in messages)]
     asked = [m for m in messages if m.direction == "host"]
-    lines += ["", *_enumeration(f"MSG_{m.name.upper()}_SIZE = {m.size}" for m in asked)]
+    lines += _enumeration(f"MSG_{m.name.upper()}_SIZE = {m.size}" for m in asked)
     for name, (members, _) in enumerations(messages).items():
         lines += _enumeration(f"{name.upper()}_{m.upper()} = {value}" for m, value in members.items())
     for message in messages:
@@ -38,7 +38,7 @@ def _constants(messages: list[Message]) -> list[str]:
     markers = {name: marker for m in messages for name, marker in m.invalid_markers.items()}
     return [
         f"/* {LICENCE} */",
-        f"/* Messages of the board link. {NOTICE} */",
+        f"/* The messages of protocol/README.md. {NOTICE} */",
         "#ifndef ECHOSTEP_MESSAGES_H",
         "#define ECHOSTEP_MESSAGES_H",
         "",
@@ -57,10 +57,9 @@ def _constants(messages: list[Message]) -> list[str]:
 
 def _declaration(message: Message) -> list[str]:
     """Struct and function of one message."""
-    lines = ["", *textwrap.wrap(f"/* {message.doc} */", COMMENT_WIDTH, subsequent_indent=" * ")]
     if not message.fields:
-        return [*lines, f"/* {message.name} has no fields. */"]
-    lines += [f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
+        return []
+    lines = ["", f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
     return [*lines, f"{_signature(message)};"]
 
 

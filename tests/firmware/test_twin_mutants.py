@@ -179,12 +179,9 @@ def rights() -> dict[tuple[str, ...], Sent]:
     "mutant",
     [pytest.param(x, id=x.means, marks=[pytest.mark.long] * (k >= ORDINARY)) for k, x in enumerate(MUTANTS)],
 )
-def test_a_mutated_constant_is_noticed(
-    mutant: Mutant, rights: dict[tuple[str, ...], Sent], tmp_path: Path, record_property: Any
-) -> None:
+def test_a_mutated_constant_is_noticed(mutant: Mutant, rights: dict[tuple[str, ...], Sent], tmp_path: Path) -> None:
     reason = killed_by(rights[mutant.faults], run(compiled(mutant, tmp_path / "firmware"), mutant.faults))
     print(f"{mutant.means} | {reason}")
-    record_property("killed by", reason)
     assert reason
 
 

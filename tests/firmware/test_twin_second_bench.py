@@ -39,14 +39,6 @@ DAY_ONE = [
 ]
 
 
-def empty_rows(milliseconds: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    """Rows of an empty room: no echo, all parts at rest."""
-    table = np.zeros(milliseconds, EXTENDED_ROW)
-    table["row"]["sync_us"], table["row"]["pressure"] = NO_SYNC, 405_296
-    table["motion"]["force"][:, :, 2] = 1_024
-    return table
-
-
 def findings(bench: Bench) -> list[Finding]:
     """All findings on all reports, as `echostep doctor --electrical` makes them."""
     reports, found = BoardReports(), []
@@ -61,9 +53,9 @@ def findings(bench: Bench) -> list[Finding]:
 def run_with(bench: Bench, *faults: str) -> list[str]:
     for fault in faults:
         bench.fault(fault)
-    bench.run(300, empty_rows(300))
+    bench.run(300, rows(300))
     bench.ask(SUBSCRIBE_ELECTRICAL)
-    bench.run(6_000, empty_rows(6_000))
+    bench.run(6_000, rows(6_000))
     return [str(finding) for finding in findings(bench)]
 
 

@@ -93,15 +93,6 @@ def test_wrong_coefficients_of_the_bmp390_are_read_again(bench: Bench, errors: i
     assert wrong_values(found) == []
 
 
-def test_wrong_coefficients_have_words(bench: Bench) -> None:
-    begin(bench, "kit=2026", "bmp390=empty")
-    assert [
-        x
-        for x in findings_of(bench)
-        if x.startswith("barometer (BMP390): its calibration reads with a wrong check sum")
-    ]
-
-
 @pytest.mark.parametrize("errors", [100, 300])
 def test_settings_that_arrive_wrong_are_set_anew(bench: Bench, errors: int) -> None:
     """P5: all parts are plugged in anew while bits to them go wrong: a leg had half its speed for ever."""

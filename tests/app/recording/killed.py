@@ -49,10 +49,8 @@ with start_recording(Path(path), {"note": "to be killed"}) as recorder:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """Loss of one kill: chunks given to the recorder, chunks missing, the time before the kill that they span; earlier recordings that changed."""
+    """Loss of one kill: the time before it that is missing, and earlier recordings that changed."""
 
-    given: int
-    missing: int
     missing_s: float
     opens: bool
     changed: int
@@ -98,4 +96,4 @@ def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
     assert numbers == list(range(1, len(numbers) + 1)), "chunks are missing in the middle"
     lost = [t_ns for number, t_ns in given if number > len(numbers)]
     missing_s = (given[-1][1] - lost[0]) * 1e-9 + CHUNK_NS * 1e-9 if lost else 0.0
-    return Kill(len(given) - 1, len(lost), missing_s, opens, changed)
+    return Kill(missing_s, opens, changed)
