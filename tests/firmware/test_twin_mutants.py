@@ -54,7 +54,6 @@ MUTANTS = [
     Mutant("foot's gyros through 12 Hz", "icm20649.c", "GYRO_120_HZ_4000_DPS", "0x17u", "0x2Fu", FOOT),
     Mutant("pressure through a filter of 127", "bmp390.c", "IIR_3", "0x04u", "0x0Eu"),
     Mutant("compass 16 gauss", "lis3mdl.c", "CTRL_REG2_4_GAUSS", "0x00u", "0x60u"),
-    # the rest is long
     Mutant("forces 4 g", "lsm6dso.c", "CTRL1_XL_1667_HZ_8_G", "0x8Eu", "0x8Au"),
     Mutant("forces 16 g", "lsm6dso.c", "CTRL1_XL_1667_HZ_8_G", "0x8Eu", "0x86u"),
     Mutant("forces at 12.5 Hz", "lsm6dso.c", "CTRL1_XL_1667_HZ_8_G", "0x8Eu", "0x1Eu"),
@@ -68,7 +67,6 @@ MUTANTS = [
     Mutant("compass at 0.6 Hz", "lis3mdl.c", "CTRL_REG1_FINEST_80_HZ", "0x7Cu", "0x60u"),
     Mutant("compass, bytes exchanged", "lis3mdl.c", "CTRL_REG4_FINEST_Z", "0x0Cu", "0x0Eu"),
     Mutant("ADIS16100's coding", "adis16100.c", "COMMAND_RATE", "0x8300u", "0x8310u", PAPERS),
-    # not of the reading's list
     Mutant("gyros at 26 Hz", "lsm6dso.c", "CTRL2_G_1667_HZ_1000_DPS", "0x88u", "0x28u"),
     Mutant("forces without LPF2", "lsm6dso.c", "CTRL1_XL_1667_HZ_8_G", "0x8Eu", "0x8Cu", VIBRATING),
     Mutant("gyros without LPF1", "lsm6dso.c", "CTRL4_C_SPI_ONLY_FILTER", "0x06u", "0x04u", VIBRATING),

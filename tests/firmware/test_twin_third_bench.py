@@ -113,7 +113,7 @@ def test_settings_that_arrive_wrong_are_set_anew(bench: Bench, errors: int) -> N
     assert kinds(found)["Pressure"] >= 11
     said = findings_of(bench)
     assert [x for x in said if x.startswith("calf gyro (LSM6DSO): sent wrong bits")]
-    assert [x for x in said if x.startswith("compass (LIS3MDL): sent wrong bits")]
+    assert [x for x in said if x.startswith("compass (LIS3MDL): sent wrong bits") and "pull-ups" in x]
 
 
 def test_settings_of_a_foot_that_arrive_wrong_are_set_anew(bench: Bench) -> None:

@@ -25,6 +25,7 @@ from echostep.board.messages import (
 )
 from echostep.board.reports import BoardReports
 from echostep_app.board.faults.device_faults import (
+    I2C_BITS_REMEDY,
     WRONG_BITS_REMEDY,
     device_findings,
     foot_findings,
@@ -145,7 +146,7 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             remedy = "a loose plug is likely: move the cable and watch"
             if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) in (Part.BMP390, Part.LIS3MDL)):
                 what = f"sent wrong bits {count} time{'s' if count > 1 else ''} {span}"
-                remedy = WRONG_BITS_REMEDY
+                remedy = I2C_BITS_REMEDY if device is Healthy.COMPASS else WRONG_BITS_REMEDY
             if fault is Fault.TOO_LATE and part_in(reports, device) is Part.PULSE:
                 what, remedy = part_text(Part.PULSE, 0, device, fault) or (what, remedy)
             findings.append(Finding(Severity.WARNING, name_of(reports, device), what, remedy))
