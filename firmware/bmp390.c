@@ -119,7 +119,7 @@ static bool read_coefficients(void)
 	const uint8_t *next = bytes + 1;
 	read(REGISTER_CHECKSUM, bytes, sizeof bytes);
 	for (uint8_t k = 0; k < PARAMETERS; k++) {
-		uint16_t bit = (uint16_t)1 << k;
+		uint16_t bit = (uint16_t)(1u << k);
 		int16_t word = (int8_t)*next++;
 		if (!(bit & OF_ONE_BYTE))
 			word = (int16_t)((uint8_t)word | (uint16_t)*next++ << 8);
