@@ -39,6 +39,7 @@
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)
 
 #define COEFFICIENTS_SIZE 21u
+#define TRIES 20u /* 0.1 s */
 #define CRC_POLYNOMIAL 0x1Du /* of their checksum, from 0xFF on, inverted in the end [Bosch, bmp3_selftest.c] */
 #define DATA_SIZE 6u
 #define COUNTS_PER_PA 4.0f
@@ -46,6 +47,7 @@
 
 static enum spi_protocol protocol; /* slow until the chip is known: an SCP1000 may be there */
 static bool measuring;
+static uint8_t tries; /* left, to read the coefficients */
 static uint32_t earliest, deadline; /* of the next sample, ticks */
 enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS }; /* PAR_T1 ... PAR_P11 [8.4] */
 #define OF_ONE_BYTE (1u << T3 | 1u << P3 | 1u << P4 | 1u << P7 | 1u << P8 | 1u << P10 | 1u << P11)
@@ -92,6 +94,7 @@ bool bmp390_answers(void)
 uint32_t bmp390_start(uint32_t now)
 {
 	measuring = false;
+	tries = TRIES;
 	protocol = SPI_MODE3;
 	write8(REGISTER_CMD, SOFT_RESET);
 	return now + RESET_TICKS;
@@ -179,7 +182,7 @@ static uint8_t measure(uint32_t now)
 	if (read8(REGISTER_CHIP_ID) != CHIP_ID)
 		return FAULT_NO_ANSWER;
 	if (!read_coefficients())
-		return FAULT_EEPROM;
+		return --tries ? FAULT_NONE : FAULT_EEPROM;
 	(void)go_through_settings(true);
 	measuring = true;
 	await_sample(now);
@@ -222,7 +225,7 @@ static uint8_t sample(uint32_t now, struct pressure_step *out)
 static uint8_t poll(uint32_t now, struct pressure_step *out)
 {
 	uint8_t flags = read8(REGISTER_STATUS);
-	bool ready = flags & STATUS_PRESSURE_READY;
+	bool ready = flags & read8(REGISTER_STATUS) & STATUS_PRESSURE_READY; /* one of them may have a wrong bit */
 	if (flags == NO_REPLY)
 		return FAULT_NO_ANSWER;
 	if (ready)

@@ -81,16 +81,17 @@ def test_a_part_that_is_confused_by_i3c_from_power_on_is_found(bench: Bench) -> 
         assert bench.status.healthy & ALL_IMUS == ALL_IMUS
 
 
-@pytest.mark.parametrize("errors", [30, 100])
-def test_wrong_coefficients_of_the_bmp390_are_read_again(bench: Bench, errors: int) -> None:
-    """P4: read once with a wrong bit, they made 8 kPa for the session."""
+@pytest.mark.parametrize(("errors", "least"), [(10, 40), (30, 30)])
+def test_wrong_coefficients_of_the_bmp390_are_read_again(bench: Bench, errors: int, least: int) -> None:
+    """P4: read once with a wrong bit, they made 8 kPa for the session. Each is read again at once."""
     bench.fault(f"spi_errors={errors}")
     begin(bench, "kit=2026")
+    found = bench.run(3_000, rows(3_000))
     bench.fault("spi_errors=0")
-    bench.run(1_500, rows(1_500))
-    found = bench.run(1_500, rows(1_500))
-    assert kinds(found)["Pressure"] > 15
-    assert wrong_values(found) == []
+    found += bench.run(1_000, rows(1_000))
+    pressures = [x for x in found if isinstance(x, m.Pressure)]
+    assert len(pressures) >= least
+    assert wrong_values(list(pressures)) == []
 
 
 @pytest.mark.parametrize("errors", [100, 300])
@@ -181,12 +182,6 @@ def test_a_foot_board_without_its_part_beats_fast(bench: Bench) -> None:
         before = len(bench.board.trace)
         bench.run(5_000, rows(5_000))
         assert least <= sum(text.startswith("lamp") for _, text in bench.board.trace[before:]) <= most
-
-
-def test_a_trigger_is_long_enough_for_each_module(bench: Bench) -> None:
-    """An RCWL-1655 needs 50 us."""
-    begin(bench, "kit=2026")
-    assert not [text for _, text in bench.board.trace if "trigger too short" in text]
 
 
 def test_a_bus_reset_between_two_looks_is_not_lost(bench: Bench) -> None:
