@@ -25,8 +25,6 @@ from echostep.board.messages import (
 )
 from echostep.board.reports import BoardReports
 from echostep_app.board.faults.device_faults import (
-    I2C_BITS_REMEDY,
-    WRONG_BITS_REMEDY,
     device_findings,
     foot_findings,
     gyro_celsius,
@@ -46,7 +44,7 @@ from echostep_app.board.faults.findings import (
     span_s,
     status_field,
 )
-from echostep_app.board.faults.part_faults import part_text
+from echostep_app.board.faults.part_faults import I2C_BITS_REMEDY, WRONG_BITS_REMEDY, part_text
 
 LEAST_MV = 4100  # a measurement below it is below the 4.5 V that 16 MHz need, although the reference is off by up to 9 % [data sheet]
 SAG = 0.08  # of the usual voltage: 0.4 V, more than the drop on a good cable
