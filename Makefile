@@ -159,9 +159,6 @@ soak: $(READY) ## eight simulated hours of the firmware through the live pipelin
 	$(MAKE) --quiet -C tools/twin
 	$(TOOL) reliability.soak $(if $(HOURS),--hours $(HOURS)) $(if $(WRAP),--wrap $(WRAP))
 
-kill: $(READY) ## kill -9 a recorder at 200 random moments: what is missing of its recording; on from where it stopped
-	$(TOOL) reliability.kill_recorder
-
 hardware: $(READY) ## checks the nets of wiring and schematics, KiCad's rules too where it is installed; the printed boxes: STL, checked to be closed; not built yet
 	@tools/apt.sh openscad || true
 	$(TOOL) hardware.nets
@@ -182,4 +179,4 @@ clean: ## remove everything that was built
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find host tools tests protocol -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: elsewhere help setup firmware twin demo real quick core-alone test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak kill hardware docs site snapshots licences lock audit flash clean
+.PHONY: elsewhere help setup firmware twin demo real quick core-alone test long board suite check check-c size measure bench page-speed wheel fuzz fuzz-host faults soak hardware docs site snapshots licences lock audit flash clean

@@ -2,8 +2,8 @@
 #include "adis16100.h"
 #include "messages.h" /* FAULT_*, MSG_GYROS_INVALID */
 
-/* Command bits [ADIS16100 datasheet]: WRITE, a channel, normal power, two's complement. Each 16-bit frame returns the reply to the
- * previous frame: channel in bits 13:12, value in bits 11:0. */
+/* Command bits [ADIS16100 datasheet]: WRITE, a channel, normal power, two's complement. Each 16-bit frame returns the
+ * reply to the previous frame: channel in bits 13:12, value in bits 11:0. */
 #define COMMAND_RATE 0x8300u
 #define COMMAND_TEMPERATURE 0x8700u
 #define CHANNEL_RATE 0x0000u

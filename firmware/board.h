@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The functions that the portable firmware needs from the board. `avr/` implements them for the ATmega32U4; a test may implement them in
- * memory. The prefix of a name is its file in `avr/`. None blocks longer than its comment says. All are called from the main loop,
- * never from an interrupt. */
+/* The functions that the portable firmware needs from the board. `avr/` implements them for the ATmega32U4; a test may
+ * implement them in memory. The prefix of a name is its file in `avr/`. None blocks longer than its comment says. All
+ * are called from the main loop, never from an interrupt. */
 #ifndef ECHOSTEP_BOARD_H
 #define ECHOSTEP_BOARD_H
 
@@ -55,17 +55,21 @@ enum twi_state twi_state(const struct twi_transfer *transfer);
 /* Ends a transfer that has taken longer than 5 ms as TWI_FAILED and frees the bus (0.2 ms); true: it did so. */
 bool twi_watch(uint32_t now);
 
-/* SPI: bytes in both directions between select and release, with the clock rate and the mode of the part that may be there. */
+/* SPI: bytes in both directions between select and release, with the clock rate and the mode of the part that may be
+ * there. */
 enum chip { CHIP_THIGH, CHIP_CALF, CHIP_BELT, CHIP_PRESSURE };
 enum spi_protocol {
 	SPI_ADIS16100, /* mode 2, 2 MHz */
 	SPI_SCP1000,   /* mode 0, 250 kHz */
-	SPI_MODE3,     /* 1 MHz, for the level shifters of the boards with BMP390, LSM6DSO, ICM-20649 rise in up to 0.41 us */
+	/* 1 MHz, for the level shifters of the boards with BMP390, LSM6DSO, ICM-20649 rise in up to 0.41 us */
+	SPI_MODE3,
 };
-uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first_byte); /* selects; the chip's byte while it gets the first one */
+/* selects; the chip's byte while it gets the first one */
+uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first_byte);
 uint8_t spi_exchange(uint8_t out);
 void spi_release(void);
-void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value); /* a whole transfer of two bytes */
+/* a whole transfer of two bytes */
+void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value);
 bool spi_pressure_ready(void); /* level of the SCP1000's DRDY */
 
 /* Self-test inputs of the gyros; one pin drives the input of all three. */
@@ -76,22 +80,25 @@ void spi_excite_gyros(enum excitation excitation);
 #define USB_ROOM 1023u /* size of the send buffer, bytes */
 
 void usb_run(void);                                   /* moves bytes and answers the host's requests */
-bool usb_is_open(void);                               /* whether a host program has the port open (DTR), and the bus is not suspended */
+/* whether a host program has the port open (DTR), and the bus is not suspended */
+bool usb_is_open(void);
 bool usb_take_opening(void);                          /* true once after each opening, which empties the buffers */
 bool usb_write(const uint8_t *bytes, uint8_t length); /* all bytes; false: no room, none was taken */
 int16_t usb_read(void);                               /* one byte, or -1 */
 bool usb_bootloader_wanted(void);                     /* whether the port has been closed at 1200 Bd for 0.12 s */
 void usb_name_foot(void);                             /* the interface's string is "foot" instead of "belt" */
-uint8_t usb_suspends(void);                           /* how often the host has suspended the bus since the start; wraps */
+/* how often the host has suspended the bus since the start; wraps */
+uint8_t usb_suspends(void);
 
-/* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also SyncOut: its
- * edges count as such except between capture_trigger and capture_end_pulse, or the end of the pulse. */
+/* The echo lines of pulse rangers, side 0 left, 1 right: both edges are captured by a timer each. The left line is also
+ * SyncOut: its edges count as such except between capture_trigger and capture_end_pulse, or the end of the pulse. */
 enum capture_state { CAPTURE_WAITING, CAPTURE_HIGH, CAPTURE_OVER };
 
 struct capture_pulse {
 	uint32_t rise, fall; /* ticks; fall is valid when the pulse is over */
 };
-bool capture_trigger(uint8_t side);   /* sends a trigger pulse (12 us); false: the line is high, or pulses without one */
+/* sends a trigger pulse (60 us); false: the line is high, or pulses without one */
+bool capture_trigger(uint8_t side);
 bool capture_pull_low(uint8_t side);  /* pulls the line low for 0.2 ms, against 1 kohm in Echo; true: it stays low */
 enum capture_state capture_take_pulse(uint8_t side, struct capture_pulse *out);
 void capture_end_pulse(uint8_t side); /* gives up waiting */
@@ -101,7 +108,8 @@ enum level { LEVEL_MISO, LEVEL_D4, LEVEL_D13, LEVEL_SDA, LEVEL_SCL, LEVELS };
 uint8_t levels_read(void); /* a bit for each */
 
 /* Supply voltage. */
-bool adc_take(uint16_t *reading); /* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */
+/* 1024 * 1.1 V / supply, and starts the next measurement (0.1 ms); false: not finished */
+bool adc_take(uint16_t *reading);
 
 /* What survives a reset of the processor, but not a loss of power. */
 struct restart {
@@ -117,9 +125,11 @@ void restart_note_sag(bool sagging); /* whether the supply is far below its usua
 
 /* Power and start. */
 void board_start(void);                /* pins, clock, buses, USB, watchdog, interrupts */
-/* Longest turn of the main loop, between two sleeps, and longest time from a timer's event to its interrupt, in ticks, since the last call. */
+/* Longest turn of the main loop, between two sleeps, and longest time from a timer's event to its interrupt, in ticks,
+ * since the last call. */
 void board_take_timing(uint16_t *turn, uint16_t *latency);
-void board_sleep(uint32_t wake_ticks); /* until then, or until an interrupt needs the main loop; restarts the watchdog */
+/* until then, or until an interrupt needs the main loop; restarts the watchdog */
+void board_sleep(uint32_t wake_ticks);
 void board_lamp(bool level);            /* the LED beside the USB plug: which level lights it depends on the board */
 uint16_t board_memory_used(void);      /* bytes: static RAM plus the deepest stack since the start */
 void board_bootloader(void);           /* resets the processor into the bootloader; does not return */

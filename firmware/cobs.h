@@ -8,11 +8,12 @@
 /* Encoded length of `length` bytes in the worst case. */
 #define COBS_ENCODED_MAX(length) ((length) + (length) / 254u + 1u)
 
-/* Encodes into `out`, which has room for COBS_ENCODED_MAX(length) and does not overlap `in`; returns the encoded length. */
+/* Encodes into `out`, which has room for COBS_ENCODED_MAX(length) and does not overlap `in`; returns the encoded
+ * length. */
 uint16_t cobs_encode(uint8_t *out, const uint8_t *in, uint16_t length);
 
-/* Decodes into `out`, which has room for `length` bytes and may be `in`; returns the decoded length. 0: `in` is empty, ends inside a
- * block or contains a zero. */
+/* Decodes into `out`, which has room for `length` bytes and may be `in`; returns the decoded length. 0: `in` is empty,
+ * ends inside a block or contains a zero. */
 uint16_t cobs_decode(uint8_t *out, const uint8_t *in, uint16_t length);
 
 #endif

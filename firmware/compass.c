@@ -9,16 +9,18 @@
 
 #define RETRY_TICKS TICKS_PER_MS /* when the bus is in use, or a trigger is near */
 #define FIRST_SAMPLE_TICKS (50u * TICKS_PER_MS) /* of a LIS3MDL; it measures at 80 Hz */
+#define CHECK_TICKS TICKS_PER_S  /* between two readings of its settings */
 #define MISSES_MAX 10u           /* readings in a row that failed, a second, after which either part is sought again */
 
 /* A CMPS10 is assumed where no LIS3MDL answers. */
-static enum { SEEK_FIRST, SEEK_SECOND, START_FIRST, START_SECOND, READS_LIS3MDL, READS_CMPS10 } state;
+static enum { SEEK_FIRST, SEEK_SECOND, START_FIRST, START_SECOND, CHECK, READS_LIS3MDL, READS_CMPS10 } state;
 static struct twi_transfer transfer;
 static bool second;     /* the LIS3MDL is at its second address */
 static bool reading;    /* a transfer is under way */
 static uint8_t misses;  /* readings in a row that failed */
 static uint32_t due;    /* next transfer, ticks */
 static uint32_t period; /* between readings, ticks */
+static uint32_t check_due; /* of a LIS3MDL's settings, ticks */
 
 void compass_start(uint32_t now)
 {
@@ -31,7 +33,7 @@ static uint8_t fault_of(enum twi_state bus)
 	return bus == TWI_DONE ? FAULT_NONE : bus == TWI_NACK ? FAULT_NO_ANSWER : FAULT_BUS_STUCK;
 }
 
-/* One transfer of the search: the identity at either address, then the settings. */
+/* One transfer of the search: the identity at either address, then the settings; or of their check. */
 static void seek_on(enum twi_state bus, uint32_t now)
 {
 	bool done = bus == TWI_DONE;
@@ -41,9 +43,15 @@ static void seek_on(enum twi_state bus, uint32_t now)
 			state = START_FIRST;
 		else
 			state = second ? READS_CMPS10 : SEEK_SECOND;
+	} else if (state == CHECK) {
+		bool equal = !done || lis3mdl_is_set(&transfer);
+		state = equal ? READS_LIS3MDL : START_FIRST;
+		if (!equal)
+			status_failed(DEVICE_COMPASS, FAULT_BAD_VALUE);
 	} else {
 		state = !done ? SEEK_FIRST : state == START_FIRST ? START_SECOND : READS_LIS3MDL;
 		due = state == READS_LIS3MDL ? now + FIRST_SAMPLE_TICKS : due;
+		check_due = now + CHECK_TICKS;
 	}
 }
 
@@ -76,22 +84,29 @@ static void finish(enum twi_state bus, uint32_t now)
 	note(fault, now);
 }
 
-static void prepare(void)
+static void prepare(uint32_t now)
 {
+	if (state == READS_LIS3MDL && ticks_reached(now, check_due)) {
+		state = CHECK;
+		check_due = now + CHECK_TICKS;
+	}
 	if (state == READS_CMPS10)
 		cmps10_prepare(&transfer);
 	else if (state == READS_LIS3MDL)
 		lis3mdl_prepare(&transfer, LIS3MDL_SAMPLE, second);
 	else if (state == START_FIRST || state == START_SECOND)
 		lis3mdl_prepare(&transfer, state == START_FIRST ? LIS3MDL_SETTINGS : LIS3MDL_MORE_SETTINGS, second);
+	else if (state == CHECK)
+		lis3mdl_prepare(&transfer, LIS3MDL_CHECK, second);
 	else
 		lis3mdl_prepare(&transfer, LIS3MDL_IDENTITY, state == SEEK_SECOND);
 }
 
-/* Starts a transfer if the bus is free, and then sets the time of the next one: those of the search follow each other. */
+/* Starts a transfer if the bus is free, and then sets the time of the next one: those of the search follow each
+ * other. */
 static void begin(uint32_t now)
 {
-	prepare();
+	prepare(now);
 	reading = twi_begin(&transfer);
 	if (!reading || state < READS_LIS3MDL)
 		return;

@@ -11,7 +11,8 @@
 /* Applies the configured rate; the first reading is due at once. */
 void compass_start(uint32_t now);
 
-/* Reads when a reading is due and no ranger trigger is near; returns the time of the next call, unless an interrupt comes earlier. */
+/* Reads when a reading is due and no ranger trigger is near; returns the time of the next call, unless an interrupt
+ * comes earlier. */
 uint32_t compass_run(uint32_t now);
 
 #endif

@@ -6,7 +6,8 @@
 #include <stdbool.h>
 #include "messages.h" /* struct msg_configure */
 
-/* Defaults: all sensors, concurrent pings, gyros at 200 Hz, compass at 10 Hz, fast pressure. Only configuration_set writes it. */
+/* Defaults: all sensors, concurrent pings, gyros at 200 Hz, compass at 10 Hz, fast pressure. Only configuration_set
+ * writes it. */
 extern struct msg_configure configuration;
 
 /* Puts the wanted settings into force, each value clamped to its range. */

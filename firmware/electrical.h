@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the board can tell of its wiring without a meter: how often each input was high. One `electrical` message a second. */
+/* What the board can tell of its wiring without a meter: how often each input was high. One `electrical` message a
+ * second. */
 #ifndef ECHOSTEP_ELECTRICAL_H
 #define ECHOSTEP_ELECTRICAL_H
 

@@ -6,7 +6,8 @@
 #include "parts.h"         /* what was found */
 
 #define CHIP CHIP_THIGH
-#define SEEK_FIRST_TICKS (90u * TICKS_PER_MS) /* before the rangers' first slot: the left echo line is the data-ready line */
+/* before the rangers' first slot: the left echo line is the data-ready line */
+#define SEEK_FIRST_TICKS (90u * TICKS_PER_MS)
 #define SEEK_TICKS (200u * TICKS_PER_MS)      /* between two searches; a start takes 11 to 100 ms */
 #define RESET_TICKS (100u * TICKS_PER_MS)     /* start-up time [DS-000192, table 5] */
 #define FIRST_SAMPLE_TICKS (200u * TICKS_PER_MS) /* gyros need 35 ms */
@@ -35,10 +36,13 @@ static void fail(uint32_t now, uint8_t fault)
 	due = now + SEEK_TICKS;
 }
 
-/* A gyro at the thigh that answers, and has proven what it is, is another part. */
+/* Not on a board that has found a ranger, a compass or a gyro since its start. */
 static bool may_be_here(void)
 {
-	return is_foot_board() || !(status.healthy & 1u << DEVICE_THIGH);
+	for (uint8_t place = DEVICE_RANGER_LEFT; place < DEVICE_PRESSURE; place++)
+		if (parts_in(place) != PART_NONE)
+			return is_foot_board();
+	return true;
 }
 
 static bool seek(uint32_t now)
@@ -83,6 +87,12 @@ bool foot_run(uint32_t now)
 	return false;
 }
 
+static void note_wrong_bits(void)
+{
+	health.fault = FAULT_BAD_VALUE;
+	health.errors++;
+}
+
 static void send(const struct capture_edge *edge, const int16_t *a)
 {
 	struct msg_foot m = { edge->ticks, edge->edge, a[3], a[4], a[5], a[0], a[1], a[2] };
@@ -97,33 +107,42 @@ bool foot_take(const struct capture_edge *edge)
 	if (health.foot_state == FOOT_STATE_SOUGHT || !is_set)
 		return true;
 	uint8_t fault = icm20649_read(CHIP, &sample);
-	if (fault != FAULT_NONE) {
+	if (fault == FAULT_NO_ANSWER) {
 		fail(edge->ticks, fault);
+		return true;
+	}
+	due = edge->ticks + SILENT_TICKS;
+	if (fault != FAULT_NONE) {
+		note_wrong_bits();
 		return true;
 	}
 	health.foot_state = FOOT_STATE_RUNNING;
 	health.missed = (uint16_t)(health.missed + edge->missed);
 	health.temperature = sample.temperature;
-	due = edge->ticks + SILENT_TICKS;
 	if (link_wants(REPORTS_FOOT))
 		send(edge, sample.axes);
 	return true;
 }
 
-/* A sample has no checksum: wrong bits show where the content is known. */
-static void check_bits(void)
+/* Settings may have arrived with a wrong bit, or been lost: they are read back, and written anew. */
+static void check_settings(void)
 {
-	if (health.foot_state != FOOT_STATE_RUNNING || icm20649_answers(CHIP))
+	if (health.foot_state != FOOT_STATE_RUNNING || icm20649_is_set(CHIP))
 		return;
-	health.fault = FAULT_BAD_VALUE;
-	health.errors++;
+	icm20649_start(CHIP);
+	note_wrong_bits();
+}
+
+bool foot_is_well(void)
+{
+	return !is_foot_board() || health.foot_state == FOOT_STATE_RUNNING;
 }
 
 void foot_send_health(void)
 {
 	if (!is_foot_board())
 		return;
-	check_bits();
+	check_settings();
 	health.ticks = clock_now();
 	link_send(MSG_FOOT_HEALTH, msg_pack_foot_health(link_body(), &health));
 }

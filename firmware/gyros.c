@@ -10,9 +10,13 @@
 #include "status.h"        /* error counters */
 
 #define START_UP_TICKS (20u * TICKS_PER_MS)   /* from a configuration to the first sample */
-#define POWER_UP_TICKS (100u * TICKS_PER_MS)  /* of parts that got their power together with the board: 10 ms [LSM6DSO], 100 ms [ICM-20649] */
+/* of parts that got their power together with the board: 10 ms [LSM6DSO], 100 ms [ICM-20649] */
+#define POWER_UP_TICKS (100u * TICKS_PER_MS)
+#define FIRST_HEALTH_TICKS (100u * TICKS_PER_MS) /* an LSM6DSO has neither rate nor temperature before */
 #define WARM_UP_SAMPLES 16u                 /* 80 ms: an LSM6DSO has rates after 70 ms */
-#define MISSES_MAX 40u                      /* samples in a row without a value after which the part is sought again: 0.2 s */
+/* samples in a row without a value after which the part is sought again: 0.2 s */
+#define MISSES_MAX 40u
+#define PROOFS 5u                           /* answers before a part is believed */
 #define TEMPERATURE_STEP_MAX 8              /* counts, 1.2 degC: between two readings one after the other, assumed */
 
 /* Of a gyro; the enums of chips, devices and sensors' bits have the three in the same order. */
@@ -51,17 +55,18 @@ void gyros_start(uint32_t now)
 	static bool again;
 	due = now + (again ? START_UP_TICKS : POWER_UP_TICKS);
 	again = true;
-	health_due = due;
+	health_due = due + FIRST_HEALTH_TICKS;
 	period = TICKS_PER_S / configuration.gyro_rate_hz;
 }
 
-/* A line that is held low reads as a rate of zero: an ADIS16100 must name the channel of its temperature, and give about the same value twice. */
+/* A line that is held low reads as a rate of zero, and an idle one as anything: an ADIS16100 must name the channel of
+ * its temperature, and give about the same value, five times. */
 static bool is_adis16100(enum chip chip, uint8_t *fault)
 {
 	int16_t first = adis16100_temperature(chip, fault);
-	if (*fault == FAULT_NONE) {
+	for (uint8_t n = 1; n < PROOFS && *fault == FAULT_NONE; n++) {
 		int16_t step = (int16_t)(adis16100_temperature(chip, fault) - first);
-		if (step > TEMPERATURE_STEP_MAX || step < -TEMPERATURE_STEP_MAX)
+		if (*fault == FAULT_NONE && (step > TEMPERATURE_STEP_MAX || step < -TEMPERATURE_STEP_MAX))
 			*fault = FAULT_WRONG_CHANNEL;
 	}
 	return *fault == FAULT_NONE;
@@ -87,7 +92,8 @@ static void seek(uint8_t gyro)
 	}
 }
 
-/* Seeks parts that are not known, and makes each ADIS16100 convert: the value of its previous conversion is a whole period old. */
+/* Seeks parts that are not known, and makes each ADIS16100 convert: the value of its previous conversion is a whole
+ * period old. */
 static void prepare(void)
 {
 	for (uint8_t k = 0; k < GYROS; k++) {
@@ -157,7 +163,8 @@ static void send_motion(uint32_t ticks)
 {
 	const int16_t *t = gyros[GYRO_THIGH].axes, *c = gyros[GYRO_CALF].axes, *b = gyros[GYRO_BELT].axes;
 	struct msg_motion m = {
-		ticks, t[0], t[1], t[2], t[3], t[4], t[5], c[0], c[1], c[2], c[3], c[4], c[5], b[0], b[1], b[2], b[3], b[4], b[5],
+		ticks, t[0], t[1], t[2], t[3], t[4], t[5],
+		c[0], c[1], c[2], c[3], c[4], c[5], b[0], b[1], b[2], b[3], b[4], b[5],
 	};
 	link_send(MSG_MOTION, msg_pack_motion(link_body(), &m));
 }
@@ -165,7 +172,8 @@ static void send_motion(uint32_t ticks)
 /* Also one that has failed since. */
 static bool any_six_axes(void)
 {
-	return parts_in(DEVICE_THIGH) == PART_LSM6DSO || parts_in(DEVICE_CALF) == PART_LSM6DSO || parts_in(DEVICE_BELT) == PART_LSM6DSO;
+	return parts_in(DEVICE_THIGH) == PART_LSM6DSO || parts_in(DEVICE_CALF) == PART_LSM6DSO ||
+	       parts_in(DEVICE_BELT) == PART_LSM6DSO;
 }
 
 /* Applies the self-test's excitation when it has changed. */
@@ -212,15 +220,18 @@ static int16_t temperature(uint8_t gyro)
 	int16_t counts = adis16100_temperature(chip_of(gyro), &fault);
 	note(gyro, fault);
 	if (fault != FAULT_NONE)
-		gyros[gyro].misses = MISSES_MAX; /* its rates may be those of a line that is held low: it must prove itself again */
+		/* its rates may be those of a line that is held low: it must prove itself again */
+		gyros[gyro].misses = MISSES_MAX;
 	return counts;
 }
 
-/* A sample has no checksum: wrong bits show where the content is known. */
-static void check_bits(uint8_t gyro)
+/* Settings may have arrived with a wrong bit, or been lost: they are read back, and written anew. */
+static void check_settings(uint8_t gyro)
 {
-	if (gyros[gyro].kind == LSM6DSO && !gyros[gyro].misses && !lsm6dso_answers(chip_of(gyro)))
-		status_failed(device_of(gyro), FAULT_BAD_VALUE);
+	if (gyros[gyro].kind != LSM6DSO || gyros[gyro].misses || excitation != EXCITE_NONE || lsm6dso_is_set(chip_of(gyro)))
+		return;
+	lsm6dso_start(chip_of(gyro));
+	status_failed(device_of(gyro), FAULT_BAD_VALUE);
 }
 
 static void report_health(void)
@@ -228,7 +239,7 @@ static void report_health(void)
 	for (uint8_t k = 0; k < GYROS; k++) {
 		if (!is_read(k))
 			continue;
-		check_bits(k);
+		check_settings(k);
 		const struct selftest_result *test = selftest_result(k);
 		int16_t counts = temperature(k);
 		struct msg_gyro_health m = { clock_now(), k, counts, test->outcome, test->response[0], test->response[1] };

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The gyros of thigh, calf and belt: finds which part is in each place; one `gyros` message per sample instant, one `motion` message
- * beside it where parts of six axes are there and the host wants it, one `gyro_health` message per gyro and second. */
+/* The gyros of thigh, calf and belt: finds which part is in each place; one `gyros` message per sample instant, one
+ * `motion` message beside it where parts of six axes are there and the host wants it, one `gyro_health` message per
+ * gyro and second. */
 #ifndef ECHOSTEP_GYROS_H
 #define ECHOSTEP_GYROS_H
 

@@ -18,7 +18,7 @@ struct icm20649_sample {
 /* Content of the identity register of what is on this chip select. */
 uint8_t icm20649_identity(enum chip chip);
 
-/* Whether it is an ICM-20649. */
+/* Whether it is an ICM-20649, by five equal answers (0.3 ms). */
 bool icm20649_answers(enum chip chip);
 
 /* Resets the part; it must be left alone for 100 ms. */
@@ -27,7 +27,11 @@ void icm20649_reset(enum chip chip);
 /* Writes its settings after a reset: 225 samples a second. */
 void icm20649_start(enum chip chip);
 
-/* The newest sample (0.1 ms); FAULT_NO_ANSWER: the part is not there. */
+/* Whether all settings are as written (0.3 ms). */
+bool icm20649_is_set(enum chip chip);
+
+/* The newest sample, read twice (0.3 ms), since it has no checksum. FAULT_NO_ANSWER: the part is not there;
+ * FAULT_BAD_VALUE: the two differ. */
 uint8_t icm20649_read(enum chip chip, struct icm20649_sample *out);
 
 #endif

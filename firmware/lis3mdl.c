@@ -20,14 +20,18 @@
 #define STATUS_READY 0x08u
 #define SAMPLE_LENGTH 7u
 
+static const uint8_t steps[][6] FLASH = { /* bytes to write, bytes to read, the bytes */
+	[LIS3MDL_IDENTITY] = { 1, 1, REGISTER_WHO_AM_I },
+	[LIS3MDL_SETTINGS] = {
+		4, 0, COUNT_UP | REGISTER_CTRL_REG1, CTRL_REG1_FINEST_80_HZ, CTRL_REG2_4_GAUSS, CTRL_REG3_CONTINUOUS,
+	},
+	[LIS3MDL_MORE_SETTINGS] = { 3, 0, COUNT_UP | REGISTER_CTRL_REG4, CTRL_REG4_FINEST_Z, CTRL_REG5_WHOLE_SAMPLES },
+	[LIS3MDL_CHECK] = { 1, 5, COUNT_UP | REGISTER_CTRL_REG1 },
+	[LIS3MDL_SAMPLE] = { 1, SAMPLE_LENGTH, COUNT_UP | REGISTER_STATUS },
+};
+
 void lis3mdl_prepare(struct twi_transfer *transfer, enum lis3mdl_step step, bool second)
 {
-	static const uint8_t steps[][6] FLASH = { /* bytes to write, bytes to read, the bytes */
-		[LIS3MDL_IDENTITY] = { 1, 1, REGISTER_WHO_AM_I },
-		[LIS3MDL_SETTINGS] = { 4, 0, COUNT_UP | REGISTER_CTRL_REG1, CTRL_REG1_FINEST_80_HZ, CTRL_REG2_4_GAUSS, CTRL_REG3_CONTINUOUS },
-		[LIS3MDL_MORE_SETTINGS] = { 3, 0, COUNT_UP | REGISTER_CTRL_REG4, CTRL_REG4_FINEST_Z, CTRL_REG5_WHOLE_SAMPLES },
-		[LIS3MDL_SAMPLE] = { 1, SAMPLE_LENGTH, COUNT_UP | REGISTER_STATUS },
-	};
 	transfer->address = second ? ADDRESS_HIGH : ADDRESS_LOW;
 	transfer->write_length = flash_byte(&steps[step][0]);
 	transfer->read_length = flash_byte(&steps[step][1]);
@@ -42,6 +46,16 @@ bool lis3mdl_answers(const struct twi_transfer *transfer)
 	if (answers || parts_in(DEVICE_COMPASS) == PART_NONE)
 		parts_found(DEVICE_COMPASS, answers ? PART_LIS3MDL : PART_NONE, identity);
 	return answers;
+}
+
+bool lis3mdl_is_set(const struct twi_transfer *transfer)
+{
+	bool equal = true;
+	for (uint8_t n = 0; n < 5; n++) {
+		const uint8_t *written = n < 3 ? &steps[LIS3MDL_SETTINGS][3 + n] : &steps[LIS3MDL_MORE_SETTINGS][n];
+		equal = transfer->bytes[n] == flash_byte(written) && equal;
+	}
+	return equal;
 }
 
 static int16_t word(const uint8_t *bytes)

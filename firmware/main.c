@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until the earliest time
- * that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time happens here. */
+/* Main loop of the sensor board: moves USB bytes, carries out the host's commands, runs each sensor, then sleeps until
+ * the earliest time that a sensor returned, or until an interrupt. Interrupts only latch; everything that takes time
+ * happens here. */
 #include "board.h"         /* start, clock, USB, sleep */
 #include "compass.h"       /* sensor */
 #include "configuration.h" /* carries out `configure` */
@@ -247,7 +248,7 @@ static uint32_t run_sensors(void)
 static void beat(void)
 {
 	uint8_t wanted = configuration.sensors & (uint8_t)~SENSORS_SYNC;
-	bool well = (status.healthy & wanted) == wanted;
+	bool well = (status.healthy & wanted) == wanted && foot_is_well();
 	board_lamp((clock_now() >> (well ? 20 : 17)) & 1u);
 }
 

@@ -4,9 +4,10 @@
 #include "bus.h"   /* it is kept free for triggers */
 #include "parts.h" /* what was found */
 
-/* [MaxBotix PD11848, I2CXL-MaxSonar-EZ data sheet] One byte starts a ranging. While it lasts, at least 25 ms, communication is ignored; the
- * result, two bytes in cm, may be read after about 80 ms. Address, command and result are an SRF02's, and there is no identity register. But
- * for an SRF02 the byte is the number of a register, after which it answers at once: a part that answers within 25 ms is not a MaxSonar. */
+/* [MaxBotix PD11848, I2CXL-MaxSonar-EZ data sheet] One byte starts a ranging. While it lasts, at least 25 ms,
+ * communication is ignored; the result, two bytes in cm, may be read after about 80 ms. Address, command and result are
+ * an SRF02's, and there is no identity register. But for an SRF02 the byte is the number of a register, after which it
+ * answers at once: a part that answers within 25 ms is not a MaxSonar. */
 #define ADDRESS_LEFT 0x70u
 #define COMMAND_RANGE 0x51u
 #define PROBE_TICKS (5u * TICKS_PER_MS)

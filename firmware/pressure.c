@@ -9,12 +9,14 @@
 
 #define RETRY_TICKS TICKS_PER_S          /* from a failure to the next search */
 #define POLL_TICKS (5u * TICKS_PER_MS)   /* between two steps of a driver */
-#define START_UP_TICKS (5u * TICKS_PER_MS) /* of a barometer that got its power together with the board: 2 ms [BMP390] */
+/* when the LSM6DSO have I3C off, which frames for a barometer may confuse; a BMP390 takes 2 ms */
+#define START_UP_TICKS (150u * TICKS_PER_MS)
 
 static enum { SEARCHING, RUNS_SCP1000, RUNS_BMP390 } state;
 static uint32_t due; /* next step, ticks */
 
-/* The BMP390 is sought first: the SCP1000 takes its frames for reads, while some writes to an SCP1000 would reconfigure a BMP390. */
+/* The BMP390 is sought first: the SCP1000 takes its frames for reads, while some writes to an SCP1000 would reconfigure
+ * a BMP390. */
 static uint32_t search(uint32_t now)
 {
 	if (bmp390_answers()) {
@@ -34,8 +36,6 @@ void pressure_start(uint32_t now)
 static void report(uint32_t now, const struct pressure_step *step)
 {
 	struct msg_pressure m = { now, step->pressure, step->temperature };
-	if (step->wrong_bits)
-		status_failed(DEVICE_PRESSURE, FAULT_BAD_VALUE);
 	status_ok(DEVICE_PRESSURE);
 	link_send(MSG_PRESSURE, msg_pack_pressure(link_body(), &m));
 }
@@ -48,6 +48,8 @@ static uint32_t advance(uint32_t now)
 		bmp390_run(now, &step);
 	else
 		scp1000_run(now, &step);
+	if (step.wrong_bits)
+		status_failed(DEVICE_PRESSURE, FAULT_BAD_VALUE);
 	if (step.pressure)
 		report(now, &step);
 	if (step.fault == FAULT_NONE)

@@ -14,11 +14,15 @@
 #define RETRY_TICKS TICKS_PER_MS          /* between tries */
 #define POLL_TICKS (TICKS_PER_MS / 2u)    /* between tries to get the bus */
 #define START_TICKS (100u * TICKS_PER_MS) /* longer than a ranging cycle that began before a reset */
-#define HOLD_TICKS (5u * TICKS_PER_MS / 2u) /* between looks at an echo line that is high; longer than a trigger keeps the bus free before it */
-#define HOLDS_MAX 120u                    /* 0.3 s: some modules hold their line for up to 0.25 s where there is no echo */
-#define MISSES_MAX 8u                     /* slots without an answer, half a second, after which any kind is sought again */
+/* between looks at an echo line that is high; longer than a trigger keeps the bus free before it */
+#define HOLD_TICKS (5u * TICKS_PER_MS / 2u)
+/* 0.3 s: some modules hold their line for up to 0.25 s where there is no echo */
+#define HOLDS_MAX 120u
+/* slots without an answer, half a second, after which any kind is sought again */
+#define MISSES_MAX 8u
 
-/* Half periods of the two schedules: see ranger.h. Of a MaxSonar a new ranging is advised every 100 ms [MaxBotix PD11848]. */
+/* Half periods of the two schedules: see ranger.h. Of a MaxSonar a new ranging is advised every 100 ms [MaxBotix
+ * PD11848]. */
 #define CONCURRENT_HALF_TICKS (33u * TICKS_PER_MS)
 #define SEQUENTIAL_HALF_TICKS (70u * TICKS_PER_MS)
 #define SLOW_CONCURRENT_HALF_TICKS (50u * TICKS_PER_MS)
@@ -53,7 +57,8 @@ static uint32_t half_period(void)
 {
 	if (configuration.schedule == SCHEDULE_SEQUENTIAL)
 		return slow ? SLOW_SEQUENTIAL_HALF_TICKS : SEQUENTIAL_HALF_TICKS;
-	uint32_t half = slow ? SLOW_CONCURRENT_HALF_TICKS : CONCURRENT_HALF_TICKS, measured = (cycle + CYCLE_MARGIN_TICKS) / 2u;
+	uint32_t half = slow ? SLOW_CONCURRENT_HALF_TICKS : CONCURRENT_HALF_TICKS;
+	uint32_t measured = (cycle + CYCLE_MARGIN_TICKS) / 2u;
 	return measured > half ? measured : half;
 }
 
@@ -61,7 +66,10 @@ static uint32_t half_period(void)
 static void follow_cycle(const struct ranger *r, uint32_t now)
 {
 	uint32_t measured = now - r->ranging.trigger;
-	cycle = r->kind != SRF02 ? 0 : measured > cycle ? cycle + (measured - cycle) / 4u : cycle - (cycle - measured) / 16u;
+	if (r->kind != SRF02)
+		cycle = 0;
+	else
+		cycle = measured > cycle ? cycle + (measured - cycle) / 4u : cycle - (cycle - measured) / 16u;
 }
 
 /* From a slot of the left ranger to the next one of the right ranger. */
@@ -70,8 +78,8 @@ static uint32_t apart(void)
 	return configuration.schedule == SCHEDULE_SIMULTANEOUS ? 0 : half_period();
 }
 
-/* Pseudo-random delay in ticks, 0 unless concurrent; the same sequence after every start. With one shift per delay, each delay would be
- * about half of the previous one. */
+/* Pseudo-random delay in ticks, 0 unless concurrent; the same sequence after every start. With one shift per delay,
+ * each delay would be about half of the previous one. */
 static uint16_t jitter(void)
 {
 	if (configuration.schedule != SCHEDULE_CONCURRENT)
@@ -96,7 +104,8 @@ static enum kind first_kind(const struct ranger *r)
 	return r->kind == UNKNOWN ? MAXSONAR : r->kind;
 }
 
-/* Moves the right ranger's slot to its place between two of the left one's, which keep no such distance when the period changes. */
+/* Moves the right ranger's slot to its place between two of the left one's, which keep no such distance when the period
+ * changes. */
 static void keep_apart(struct ranger *r)
 {
 	int32_t half = (int32_t)half_period(), off = (int32_t)(r->slot - rangers[RANGER_LEFT].slot - apart()) % (2 * half);
@@ -108,7 +117,8 @@ static void keep_apart(struct ranger *r)
 		r->slot -= (uint32_t)off;
 }
 
-/* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips slots. */
+/* Goes to the next slot. A ranger that is late by less than half a period triggers late; one that is later skips
+ * slots. */
 static void schedule_next(struct ranger *r, uint32_t now)
 {
 	do
@@ -128,10 +138,13 @@ static void report(const struct ranger *r, uint8_t outcome, uint16_t time_of_fli
 	link_send(MSG_PING, msg_pack_ping(link_body(), &ping));
 }
 
+/* FAULT_NONE: an answer, but not yet enough to know the kind. */
 static void fail(struct ranger *r, uint32_t now, uint8_t fault)
 {
-	status_failed((enum device)r->index, fault);
-	report(r, OUTCOME_BUS_ERROR, 0);
+	if (fault != FAULT_NONE) {
+		status_failed((enum device)r->index, fault);
+		report(r, OUTCOME_BUS_ERROR, 0);
+	}
 	schedule_next(r, now);
 }
 
@@ -193,21 +206,26 @@ static void fail_or_seek_on(struct ranger *r, uint32_t now)
 	r->due = now;
 }
 
-/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. A module without a
- * timeout holds it for ever, unless it is pulled low. */
+/* The echo line is high: held by a module that has heard no echo, pulled up because nothing is plugged in, or stuck. A
+ * module without a timeout holds it for ever, unless it is pulled low: an answer that does not end shows that one is
+ * there. */
 static void hold(struct ranger *r, uint32_t now)
 {
-	if (r->kind == PULSE && r->holds < HOLDS_MAX) {
+	bool heard = pulse_was_heard(r->index);
+	if (heard && r->holds < HOLDS_MAX) {
 		r->holds++;
 		r->due = now + HOLD_TICKS;
 		return;
 	}
-	if (parts_in(r->index) == PART_PULSE && capture_pull_low(r->index)) {
+	if (heard)
+		parts_found(r->index, PART_PULSE, 0);
+	bool found = parts_in(r->index) == PART_PULSE;
+	if (found && capture_pull_low(r->index)) {
 		status_failed((enum device)r->index, FAULT_TOO_LATE);
 		r->holds = 0;
 		return;
 	}
-	miss(r, now, parts_in(r->index) == PART_PULSE ? FAULT_ALWAYS_READY : r->ranging.fault);
+	miss(r, now, found ? FAULT_ALWAYS_READY : r->ranging.fault);
 }
 
 static void trigger(struct ranger *r, uint32_t now)
@@ -218,9 +236,11 @@ static void trigger(struct ranger *r, uint32_t now)
 		r->pinging = maxsonar_begin(r->index, &r->ranging);
 	else if (r->pinged == SRF02)
 		r->pinging = srf02_begin(r->index, &r->ranging);
-	else if (pulse_begin(r->index, &r->ranging))
-		r->pinging = true;
 	else
+		r->pinging = pulse_begin(r->index, &r->ranging);
+	if (r->pinging)
+		r->holds = 0;
+	else if (r->pinged == PULSE)
 		hold(r, now);
 }
 

@@ -27,7 +27,8 @@
 
 #define RESET_TICKS (60u * TICKS_PER_MS)         /* busy after a reset */
 #define STARTING_MAX_TICKS (150u * TICKS_PER_MS) /* after that: limit of the start */
-#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS) /* the fast mode needs 110 ms per sample: an earlier DRDY is a stuck line */
+/* the fast mode needs 110 ms per sample: an earlier DRDY is a stuck line */
+#define SAMPLE_MIN_TICKS (50u * TICKS_PER_MS)
 #define SAMPLE_MAX_TICKS (2u * TICKS_PER_S)   /* the slow mode needs 560 ms per sample */
 
 static bool measuring;

@@ -3,18 +3,19 @@
 #include "messages.h" /* SELF_TEST_* */
 #include "parts.h"    /* whose limits apply */
 
-/* Four parts, 0.72 s in all: at rest, ST1, ST2, at rest again. Each part waits 100 ms [ST's example for the LSM6DSO; the ADIS16100's filter of
- * 40 Hz needs less], then averages 16 samples. */
+/* Four parts, 0.72 s in all: at rest, ST1, ST2, at rest again. Each part waits 100 ms [ST's example for the LSM6DSO;
+ * the ADIS16100's filter of 40 Hz needs less], then averages 16 samples. */
 #define SETTLE_SAMPLES 20u
 #define WINDOW_SAMPLES 16u
 #define PART_SAMPLES (SETTLE_SAMPLES + WINDOW_SAMPLES)
 
-/* Response in counts: 150 to 450 mV [ADXRS300 data sheet; typical 270 mV] through the ADIS16100's converter, 4096 counts for 5 V, with
- * a margin of about 2 counts at the lower end and 7 at the upper one. */
+/* Response in counts: 150 to 450 mV [ADXRS300 data sheet; typical 270 mV] through the ADIS16100's converter, 4096
+ * counts for 5 V, with a margin of about 2 counts at the lower end and 7 at the upper one. */
 #define RESPONSE_MIN 121
 #define RESPONSE_MAX 376
 #define SYMMETRY_MAX 80 /* counts: a larger sum of the two responses means that the rate itself changed */
-/* The same of an LSM6DSO: 150 to 700 deg/s at a range of 2000 [DS12140, table 2, page 10]; a tenth of asymmetry, assumed. */
+/* The same of an LSM6DSO: 150 to 700 deg/s at a range of 2000 [DS12140, table 2, page 10]; a tenth of asymmetry,
+ * assumed. */
 #define LSM6DSO_RESPONSE_MIN 615
 #define LSM6DSO_RESPONSE_MAX 2870
 #define LSM6DSO_SYMMETRY_MAX 300

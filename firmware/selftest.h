@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Self-test of the three gyros: inputs ST1 and ST2 deflect the vibrating mass, first one way, then the other; the rate must follow. */
+/* Self-test of the three gyros: inputs ST1 and ST2 deflect the vibrating mass, first one way, then the other; the rate
+ * must follow. */
 #ifndef ECHOSTEP_SELFTEST_H
 #define ECHOSTEP_SELFTEST_H
 
@@ -22,7 +23,8 @@ bool selftest_running(void);
 /* What the gyros' inputs must be now. */
 enum excitation selftest_excitation(void);
 
-/* Adds one sample of the three gyros (counts; MSG_GYROS_INVALID: no answer) to the running test, every 5 ms. The last one ends it. */
+/* Adds one sample of the three gyros (counts; MSG_GYROS_INVALID: no answer) to the running test, every 5 ms. The last
+ * one ends it. */
 void selftest_add_rates(const int16_t rate[GYROS]);
 
 const struct selftest_result *selftest_result(uint8_t gyro);

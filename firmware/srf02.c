@@ -4,8 +4,8 @@
 #include "bus.h"   /* it is kept free for triggers */
 #include "parts.h" /* what was found */
 
-/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: up to 65 ms, in practice about 61 ms; it
- * listens longer than to its farthest range. */
+/* [Devantech, SRF02 technical specification] An SRF02 does not answer while it is ranging: up to 65 ms, in practice
+ * about 61 ms; it listens longer than to its farthest range. */
 #define ADDRESS_LEFT 0x70u
 #define COMMAND_RANGE_US 0x52u
 #define REGISTER_COMMAND 0u
@@ -13,7 +13,8 @@
 #define UNUSED 0x80u /* content of register 1 [SRF02 technical specification] */
 #define REVISION_BUSY 0xFFu /* some SRF02 answer this while ranging, instead of not answering */
 #define RANGING_MIN_TICKS (60u * TICKS_PER_MS) /* first request for the result */
-#define RANGING_MAX_TICKS (90u * TICKS_PER_MS) /* last request: up to 65 ms, and 70 "is a better value" [Devantech's forum, t=269], with a margin */
+/* last request: up to 65 ms, and 70 "is a better value" [Devantech's forum, t=269], with a margin */
+#define RANGING_MAX_TICKS (90u * TICKS_PER_MS)
 #define FARTHEST_US 35500u /* 600 cm [technical specification]: what comes later is another ping's */
 #define POLL_TICKS (TICKS_PER_MS / 2u)         /* between requests */
 

@@ -4,7 +4,7 @@
 #define ECHOSTEP_VERSION_H
 
 #define VERSION_MAJOR 1
-#define VERSION_MINOR 8 /* one digit */
+#define VERSION_MINOR 9 /* one digit */
 #define VERSION_PATCH 0 /* one digit */
 
 #endif

@@ -29,7 +29,7 @@ digest=$({ sha256sum "$hex" 2>/dev/null || shasum -a 256 "$hex"; } | cut -d " " 
 echo "$hex: SHA-256 $digest"
 
 # Opening the port at 1200 Bd and closing it starts the bootloader, which appears as another port or as this one anew.
-before=$(ls /dev/ttyACM* 2>/dev/null)
+before=$(ls /dev/ttyACM* /dev/cu.usbmodem* 2>/dev/null)
 device=$(readlink -f "$port")
 stty -F "$port" 1200 hupcl 2>/dev/null || stty -f "$port" 1200 hupcl || fail "$port: cannot open the port"
 bootloader=""
@@ -37,7 +37,7 @@ gone=""
 for _ in $(seq 100); do
 	sleep 0.1
 	[ -e "$port" ] && [ "$(readlink -f "$port")" = "$device" ] || gone=1
-	for new in $(ls /dev/ttyACM* 2>/dev/null); do
+	for new in $(ls /dev/ttyACM* /dev/cu.usbmodem* 2>/dev/null); do
 		echo "$before" | grep -qx "$new" || bootloader=$new
 	done
 	[ -z "$bootloader" ] && [ -n "$gone" ] && [ -e "$port" ] && bootloader=$port

@@ -11,7 +11,8 @@
 #define UNTOUCHED_MAX 64u     /* bytes: more than the largest array on the stack, which may stay partly unwritten */
 #define ALARM_MARGIN_TICKS 4u /* too close for the alarm to be set in time */
 
-/* Caterina stays in the bootloader after a watchdog reset when this key is in RAM; old and new versions look at different addresses. */
+/* Caterina stays in the bootloader after a watchdog reset when this key is in RAM; old and new versions look at
+ * different addresses. */
 #define BOOTLOADER_KEY 0x7777u
 #define BOOTLOADER_KEY_OLD ((volatile uint16_t *)0x0800)
 #define BOOTLOADER_KEY_NEW ((volatile uint16_t *)(RAMEND - 1))
@@ -26,7 +27,8 @@ static void paint_free_memory(void)
 		*p = PAINT;
 }
 
-/* A0 to A3 belong to JTAG where its fuse is set, until this bit is written twice within four cycles [data sheet, 26.5.1]. */
+/* A0 to A3 belong to JTAG where its fuse is set, until this bit is written twice within four cycles [data sheet,
+ * 26.5.1]. */
 static void free_analog_pins(void)
 {
 	uint8_t control = MCUCR | BIT(JTD);
@@ -98,8 +100,8 @@ void board_sleep(uint32_t wake_ticks)
 	woke = clock_now();
 }
 
-/* Searches downwards from the deepest byte known so far, until UNTOUCHED_MAX painted bytes follow each other. A search of the whole memory
- * would take 0.7 ms. */
+/* Searches downwards from the deepest byte known so far, until UNTOUCHED_MAX painted bytes follow each other. A search
+ * of the whole memory would take 0.7 ms. */
 uint16_t board_memory_used(void)
 {
 	static const uint8_t *deepest = (const uint8_t *)(RAMEND + 1);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The two input captures, each with its line: PD4 (Timer1), which is SyncOut or the data-ready line of a foot board, or the left echo line; and
- * PC7 (Timer3, at the same rate), the right echo line. A ping owns its line from the trigger to the end of the pulse, else the line's edges
- * are SyncOut's. Triggers are on PF5 (left) and PF4 (right). A capture has no jitter but the timers' half microsecond, however late its
- * interrupt is. */
+/* The two input captures, each with its line: PD4 (Timer1), which is SyncOut or the data-ready line of a foot board, or
+ * the left echo line; and PC7 (Timer3, at the same rate), the right echo line. A ping owns its line from the trigger to
+ * the end of the pulse, else the line's edges are SyncOut's. Triggers are on PF5 (left) and PF4 (right). A capture has
+ * no jitter but the timers' half microsecond, however late its interrupt is. */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */
 #include <avr/power.h>     /* switching on Timer3 */
@@ -12,7 +12,8 @@
 
 #define LEFT 0u
 #define RIGHT 1u
-#define TRIGGER_US 12 /* at least 10 [HC-SR04 user guide] */
+#define TRIGGER_US 60 /* at least 10 [HC-SR04 user guide], 50 [RCWL-1655] */
+#define RISE_US 12
 #define PULL_US 200
 #define TRIGGER_LEFT BIT(PF5)
 #define TRIGGER_RIGHT BIT(PF4)
@@ -46,7 +47,8 @@ static void await_edge(uint8_t side, bool rising)
 	}
 }
 
-/* The bootloader leaves PC7, the pin of its LED, as an output. Lines that nothing drives are pulled up, so that they do not follow the mains. */
+/* The bootloader leaves PC7, the pin of its LED, as an output. Lines that nothing drives are pulled up, so that they do
+ * not follow the mains. */
 void capture_start(void)
 {
 	DDRC &= (uint8_t)~LINE_RIGHT;
@@ -63,7 +65,8 @@ static void start_timer_3(void)
 	DDRF |= TRIGGER_LEFT | TRIGGER_RIGHT;
 	TCCR3A = 0;
 	TCCR3B = RISING_3;
-	ATOMIC_BLOCK(ATOMIC_RESTORESTATE) /* an interrupt between the two readings would shift all stamps of the right ranger */
+	/* an interrupt between the two readings would shift all stamps of the right ranger */
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
 	{
 		timer_3_behind = (uint16_t)(TCNT1 - TCNT3);
 	}
@@ -95,17 +98,26 @@ bool capture_trigger(uint8_t side)
 	return true;
 }
 
-/* Never drives high: the pull-up goes off before, and on after it. */
+/* Never drives high: the pull-up goes off before, and on after it. The edges that it makes are nobody's. */
 bool capture_pull_low(uint8_t side)
 {
 	volatile uint8_t *port = side == LEFT ? &PORTD : &PORTC, *direction = side == LEFT ? &DDRD : &DDRC;
 	uint8_t line = side == LEFT ? LINE_LEFT : LINE_RIGHT;
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		TIMSK1 &= (uint8_t)~BIT(ICIE1);
+	}
 	*port &= (uint8_t)~line;
 	*direction |= line;
 	_delay_us(PULL_US);
 	*direction &= (uint8_t)~line;
 	*port |= line;
-	_delay_us(TRIGGER_US);
+	_delay_us(RISE_US);
+	ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+	{
+		TIFR1 = side == LEFT ? BIT(ICF1) : 0;
+		TIMSK1 |= BIT(ICIE1);
+	}
 	return !line_is_taken(side);
 }
 

@@ -21,8 +21,8 @@ void clock_start(void)
 	TIMSK1 = BIT(OCIE1A) | BIT(TOIE1);
 }
 
-/* Extends a timer value to 32 bits; call with interrupts off. An overflow that is flagged but not counted yet has happened before a small
- * timer value, and after a large one. */
+/* Extends a timer value to 32 bits; call with interrupts off. An overflow that is flagged but not counted yet has
+ * happened before a small timer value, and after a large one. */
 static uint32_t extend(uint16_t low)
 {
 	uint16_t high = overflows;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What survives a reset of the processor: cause and number of its starts, and where it was when it crashed. The variables in .noinit keep
- * their values as long as the memory has power. They lie above the variables of the bootloader Caterina and below its key (size.py). */
+/* What survives a reset of the processor: cause and number of its starts, and where it was when it crashed. The
+ * variables in .noinit keep their values as long as the memory has power. They lie above the variables of the
+ * bootloader Caterina and below its key (size.py). */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */
 #include <avr/wdt.h>       /* watchdog */
@@ -25,8 +26,8 @@ static bool is_kept(void)
 	return kept.valid == VALID && kept.valid_too == (uint16_t)~VALID;
 }
 
-/* The cause when MCUSR is zero, because a bootloader has cleared it. Caterina starts the firmware at once after a loss of power and after a
- * watchdog reset, and else waits for 8 s with its own USB port. */
+/* The cause when MCUSR is zero, because a bootloader has cleared it. Caterina starts the firmware at once after a loss
+ * of power and after a watchdog reset, and else waits for 8 s with its own USB port. */
 static uint8_t remembered_cause(bool bootloader_waited)
 {
 	if (!is_kept())
@@ -85,11 +86,12 @@ const struct restart *restart_known(void)
 	return &kept.known;
 }
 
-/* Interrupt after 125 ms without wdt_reset, then reset. Runs before the variables are set (.init3), so that a processor that hangs during its
- * start is restarted too. */
+/* Interrupt after 125 ms without wdt_reset, then reset. Runs before the variables are set (.init3), so that a processor
+ * that hangs during its start is restarted too. */
 #define CHANGE 0x18    /* WDCE, WDE */
 #define INTERRUPT 0x4B /* WDIE, WDE, WDP1, WDP0 */
-_Static_assert(CHANGE == (BIT(WDCE) | BIT(WDE)) && INTERRUPT == (BIT(WDIE) | BIT(WDE) | BIT(WDP1) | BIT(WDP0)), "WDTCSR");
+_Static_assert(CHANGE == (BIT(WDCE) | BIT(WDE)), "WDTCSR");
+_Static_assert(INTERRUPT == (BIT(WDIE) | BIT(WDE) | BIT(WDP1) | BIT(WDP0)), "WDTCSR");
 #define TEXT_OF(x) #x
 #define TEXT(x) TEXT_OF(x)
 __asm__(".pushsection .init3, \"ax\", @progbits\n"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* SPI master: polled bytes to one of four chips, in the mode and at the rate of the part; and the other pins of these chips. SCK PB1, MOSI
- * PB2, MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 barometer, active low; DRDY of the SCP1000 on PE6; the gyros' ST1 on PF7,
- * ST2 on PF6. */
+/* SPI master: polled bytes to one of four chips, in the mode and at the rate of the part; and the other pins of these
+ * chips. SCK PB1, MOSI PB2, MISO PB3; chip selects PB4 thigh, PB5 calf, PB6 belt, PD7 barometer, active low; DRDY of
+ * the SCP1000 on PE6; the gyros' ST1 on PF7, ST2 on PF6. */
 #include <avr/io.h> /* registers */
 #include "shared.h"
 

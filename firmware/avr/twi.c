@@ -51,7 +51,8 @@ bool twi_begin(struct twi_transfer *transfer)
 enum twi_state twi_state(const struct twi_transfer *transfer)
 {
 	enum twi_state state = transfer->state;
-	__asm__ volatile("" ::: "memory"); /* the interrupt writes bytes and ticks before the state: the caller must read them after it */
+	/* the interrupt writes bytes and ticks before the state: the caller must read them after it */
+	__asm__ volatile("" ::: "memory");
 	return state;
 }
 
@@ -63,8 +64,8 @@ static void finish(enum twi_state state)
 	board_awake = true;
 }
 
-/* SCL is held low until TWCR is written. So the clock, read right after it, gives the time of the stop condition however late this
- * interrupt is. */
+/* SCL is held low until TWCR is written. So the clock, read right after it, gives the time of the stop condition
+ * however late this interrupt is. */
 static void stop(enum twi_state state)
 {
 	TWCR = BIT(TWINT) | BIT(TWEN) | BIT(TWSTO);
@@ -146,7 +147,8 @@ static void release(uint8_t line)
 	_delay_us(HALF_BIT_US);
 }
 
-/* Frees a bus whose SDA a device holds low: clocks the device through its byte, then sends a stop condition [I2C specification, 3.1.16]. */
+/* Frees a bus whose SDA a device holds low: clocks the device through its byte, then sends a stop condition [I2C
+ * specification, 3.1.16]. */
 static void free_bus(void)
 {
 	TWCR = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* USB device controller of the ATmega32U4 [datasheet, chapters 21 and 22]: attach, bus reset, and the port's two bulk endpoints.
- * An interrupt only disables itself and wakes the main loop; usb_run does the work and enables it again. */
+/* USB device controller of the ATmega32U4 [datasheet, chapters 21 and 22]: attach, bus reset, and the port's two bulk
+ * endpoints. An interrupt only disables itself and wakes the main loop; usb_run does the work and enables it again. */
 #include <avr/interrupt.h> /* ISR */
 #include <avr/io.h>        /* registers */
 #include "shared.h"
@@ -14,8 +14,9 @@
 #define MEMORY_16 (BIT(EPSIZE0) | BIT(ALLOC))
 #define MEMORY_64_DOUBLE (BIT(EPSIZE1) | BIT(EPSIZE0) | BIT(EPBK0) | BIT(ALLOC))
 
-/* Values of UEINTX that hand over a bank: FIFOCON and the flag of the bank are written as zero, which clears them. A one leaves a flag as
- * it is; but on an IN endpoint, a one in the bit of RXOUTI (there KILLBK) would take back the bank just sent, so that bit is zero. */
+/* Values of UEINTX that hand over a bank: FIFOCON and the flag of the bank are written as zero, which clears them. A
+ * one leaves a flag as it is; but on an IN endpoint, a one in the bit of RXOUTI (there KILLBK) would take back the bank
+ * just sent, so that bit is zero. */
 #define RELEASE_IN (BIT(NAKOUTI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL))
 #define RELEASE_OUT (BIT(NAKINI) | BIT(RXSTPI) | BIT(STALLEDI) | BIT(RWAL) | BIT(TXINI))
 
@@ -26,7 +27,8 @@
 
 static volatile bool bus_was_reset, suspended;
 static uint8_t suspends;
-static uint8_t ring[RING_SIZE] __attribute__((section(".noinit.ring"))); /* send buffer; empty when head == tail; above restart.c's memory */
+/* send buffer; empty when head == tail; above restart.c's memory */
+static uint8_t ring[RING_SIZE] __attribute__((section(".noinit.ring")));
 static uint16_t head, tail;     /* indices of the next byte to write and to send */
 
 void usb_start(void)
@@ -42,15 +44,17 @@ void usb_start(void)
 	UDCON = 0; /* full speed, attached */
 }
 
-/* A bus without traffic for 3 ms is suspended. The controller's clock stays on, so that it answers at once when the bus resumes. On a bus that
- * stays idle the flag may come back at once: the interrupt is off until traffic does [Arduino's USBCore.cpp]. */
+/* A bus without traffic for 3 ms is suspended. The controller's clock stays on, so that it answers at once when the bus
+ * resumes. On a bus that stays idle the flag may come back at once: the interrupt is off until traffic does [Arduino's
+ * USBCore.cpp]. */
 ISR(USB_GEN_vect)
 {
-	if (UDINT & BIT(EORSTI))
+	uint8_t flags = UDINT;
+	suspended = !(flags & BIT(EORSTI));
+	if (!suspended)
 		bus_was_reset = true;
-	suspended = !(UDINT & BIT(EORSTI));
 	UDIEN = suspended ? BIT(EORSTE) : BIT(EORSTE) | BIT(SUSPE);
-	UDINT = 0;
+	UDINT = (uint8_t)~flags; /* what comes after the look stays flagged */
 	board_awake = true;
 }
 
@@ -71,7 +75,8 @@ ISR(USB_COM_vect)
 void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory)
 {
 	UENUM = endpoint;
-	UECONX = BIT(RSTDT) | BIT(EPEN); /* RSTDT: the first packet is DATA0, as the host expects after it has set a configuration */
+	/* RSTDT: the first packet is DATA0, as the host expects after it has set a configuration */
+	UECONX = BIT(RSTDT) | BIT(EPEN);
 	UECFG0X = type;
 	UECFG1X = memory;
 }
@@ -158,7 +163,8 @@ bool usb_is_open(void)
 	return usb_control_is_configured() && usb_control_port_is_open() && !suspended;
 }
 
-/* A start of frame ends a suspension. A port that is not configured yet is suspended until the host resets the bus: this does not count. */
+/* A start of frame ends a suspension. A port that is not configured yet is suspended until the host resets the bus:
+ * this does not count. */
 static void follow_suspend(void)
 {
 	static bool counted;

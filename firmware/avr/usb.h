@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Shared by the parts of the USB driver: usb.c moves the bytes of the port, usb_control.c answers the host's requests, usb_descriptors.c
- * holds the descriptors. */
+/* Shared by the parts of the USB driver: usb.c moves the bytes of the port, usb_control.c answers the host's requests,
+ * usb_descriptors.c holds the descriptors. */
 #ifndef ECHOSTEP_AVR_USB_H
 #define ECHOSTEP_AVR_USB_H
 
@@ -13,8 +13,10 @@ enum { EP_CONTROL, EP_NOTIFY, EP_OUT, EP_IN };
 #define NOTIFY_SIZE 16u
 
 /* usb.c */
-void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory); /* `type` for UECFG0X, `memory` for UECFG1X; selects the endpoint */
-void usb_start_port(void);                                       /* enables the port's endpoints when the host sets the configuration */
+/* `type` for UECFG0X, `memory` for UECFG1X; selects the endpoint */
+void usb_enable(uint8_t endpoint, uint8_t type, uint8_t memory);
+/* enables the port's endpoints when the host sets the configuration */
+void usb_start_port(void);
 void usb_empty_port(void);                                       /* drops the bytes that wait for the host */
 
 /* usb_descriptors.c */

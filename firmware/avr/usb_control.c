@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never waits: each call of
- * usb_control_run does what the controller is ready for, and enables the interrupt of the next step. */
+/* USB control endpoint: standard requests [USB 2.0, chapter 9] and those of the CDC-ACM class [PSTN120, 6.3]. Never
+ * waits: each call of usb_control_run does what the controller is ready for, and enables the interrupt of the next
+ * step. */
 #include <avr/io.h> /* registers */
 #include "shared.h"
 #include "usb.h"
@@ -43,8 +44,8 @@ struct setup {
 	uint16_t value, index, length;
 };
 
-/* Of the request under way. REPLYING and DESCRIBING: data for the host. ACKNOWLEDGING: the empty packet of the status stage. ADDRESSING:
- * after it, the new address takes effect. */
+/* Of the request under way. REPLYING and DESCRIBING: data for the host. ACKNOWLEDGING: the empty packet of the status
+ * stage. ADDRESSING: after it, the new address takes effect. */
 enum stage { IDLE, REPLYING, DESCRIBING, RECEIVING_LINE_CODING, ACKNOWLEDGING, ADDRESSING };
 
 static enum stage stage;
@@ -90,7 +91,8 @@ bool usb_take_opening(void)
 
 bool usb_bootloader_wanted(void)
 {
-	return bootloader_wanted && ticks_reached(clock_now(), bootloader_due) && stage == IDLE; /* only after the host has its acknowledge */
+	/* only after the host has its acknowledge */
+	return bootloader_wanted && ticks_reached(clock_now(), bootloader_due) && stage == IDLE;
 }
 
 static bool send(enum stage how, uint8_t length, uint16_t wanted)
@@ -151,7 +153,8 @@ static bool set_interface(const struct setup *s)
 	return acknowledge();
 }
 
-/* The address and its bit ADDEN must not be written at once [data sheet, 22.7]; ADDEN follows after the status stage. */
+/* The address and its bit ADDEN must not be written at once [data sheet, 22.7]; ADDEN follows after the status
+ * stage. */
 static bool set_address(uint8_t address)
 {
 	UDADDR = address;
@@ -161,7 +164,8 @@ static bool set_address(uint8_t address)
 
 static void check_for_1200_baud(void)
 {
-	bool wanted = line_coding[0] == (BOOTLOADER_BAUD & 0xFFu) && line_coding[1] == BOOTLOADER_BAUD >> 8 && !line_coding[2] && !dtr;
+	bool slow = line_coding[0] == (BOOTLOADER_BAUD & 0xFFu) && line_coding[1] == BOOTLOADER_BAUD >> 8;
+	bool wanted = slow && !line_coding[2] && !dtr;
 	if (wanted && !bootloader_wanted)
 		bootloader_due = clock_now() + DTR_LOW_TICKS;
 	bootloader_wanted = wanted;
@@ -282,7 +286,8 @@ static void send_part(void)
 {
 	for (uint8_t n = 0; n < EP_SIZE && reply.index < reply.length; n++, reply.index++)
 		UEDATX = stage == DESCRIBING ? usb_descriptor_byte(reply.descriptor, reply.index) : reply.bytes[reply.index];
-	if (reply.index == reply.length) /* no descriptor's length is a multiple of EP_SIZE: the last packet is short, or has the last byte wanted */
+	/* no descriptor's length is a multiple of EP_SIZE: the last packet is short, or has the last byte wanted */
+	if (reply.index == reply.length)
 		stage = IDLE;
 	UEINTX = (uint8_t)~BIT(TXINI);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash, except the serial number, which is made of the
- * chip's own number. */
+/* USB descriptors: one CDC-ACM port [USB 2.0, chapter 9; CDC120; PSTN120]. All in flash, except the serial number,
+ * which is made of the chip's own number. */
 #include <avr/boot.h>     /* signature row */
 #include <avr/pgmspace.h> /* PROGMEM */
 #include <util/atomic.h>  /* ATOMIC_BLOCK */
@@ -20,7 +20,8 @@ static const uint8_t device_descriptor[] PROGMEM = {
 #define CONFIGURATION_SIZE 67
 static const uint8_t configuration_descriptor[] PROGMEM = {
 	9, 2, CONFIGURATION_SIZE, 0, 2, 1, 0, 0x80, 50,      /* two interfaces, bus powered, 100 mA */
-	9, 4, 0, 0, 1, 2, 2, 0, 4,                           /* communications interface, abstract control model, no AT commands; its string */
+	/* communications interface, abstract control model, no AT commands; its string */
+	9, 4, 0, 0, 1, 2, 2, 0, 4,
 	5, 0x24, 0, 0x10, 0x01,                              /* CDC 1.10 */
 	5, 0x24, 1, 0, 1,                                    /* no call management */
 	4, 0x24, 2, 2,                                       /* line coding and line state */
@@ -38,7 +39,8 @@ static const uint8_t product[] PROGMEM = {
 	26, 3, 's', 0, 'e', 0, 'n', 0, 's', 0, 'o', 0, 'r', 0, ' ', 0, 'b', 0, 'o', 0, 'a', 0, 'r', 0, 'd', 0,
 };
 
-/* Which board of a kit it is: read after the port was debounced for 100 ms, when the foot's part has been sought, so that udev gives each board its name. */
+/* Which board of a kit it is: read after the port was debounced for 100 ms, when the foot's part has been sought, so
+ * that udev gives each board its name. */
 static const uint8_t foot[] PROGMEM = { 10, 3, 'f', 0, 'o', 0, 'o', 0, 't', 0 };
 static const uint8_t belt[] PROGMEM = { 10, 3, 'b', 0, 'e', 0, 'l', 0, 't', 0 };
 static bool is_foot;
@@ -48,7 +50,8 @@ void usb_name_foot(void)
 	is_foot = true;
 }
 
-/* The chip's lot, wafer and place on it: ten bytes of the signature row, of which the data sheet is silent and which LUFA reads too. */
+/* The chip's lot, wafer and place on it: ten bytes of the signature row, of which the data sheet is silent and which
+ * LUFA reads too. */
 #define CHIP_NUMBER 0x0Eu
 #define SERIAL_DIGITS 20u
 #define SERIAL_SIZE (2u + 2u * SERIAL_DIGITS)

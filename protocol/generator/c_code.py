@@ -7,22 +7,30 @@ In: the messages between board and host. Out: C11 source. Owns nothing.
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable
 
 from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
-COMMENT_WIDTH = 130  # as in the hand-written C
+COMMENT_WIDTH = 120  # as in the hand-written C
 
 
 def c_header(messages: list[Message]) -> str:
     """firmware/messages.h."""
     lines = _constants(messages)
-    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()} = 0x{m.id:02X}," for m in messages), "};"]
-    lines += ["", "enum {", *(f"\tMSG_{m.name.upper()}_SIZE = {m.size}," for m in messages), "};"]
+    lines += ["", *_enumeration(f"MSG_{m.name.upper()} = 0x{m.id:02X}" for m in messages)]
+    asked = [m for m in messages if m.direction == "host"]
+    lines += _enumeration(f"MSG_{m.name.upper()}_SIZE = {m.size}" for m in asked)
     for name, (members, _) in enumerations(messages).items():
-        lines += ["", "enum {", *(f"\t{name.upper()}_{m.upper()} = {value}," for m, value in members.items()), "};"]
+        lines += _enumeration(f"{name.upper()}_{m.upper()} = {value}" for m, value in members.items())
     for message in messages:
         lines += _declaration(message)
     return "\n".join([*lines, "", "#endif"]) + "\n"
+
+
+def _enumeration(members: Iterable[str]) -> list[str]:
+    whole = ", ".join(member.replace(" ", "\0") for member in members)  # no line ends within a member
+    lines = textwrap.wrap(f"enum {{ {whole} }};", COMMENT_WIDTH - 3, subsequent_indent="\t")
+    return [line.replace("\0", " ") for line in lines]
 
 
 def _constants(messages: list[Message]) -> list[str]:
@@ -30,7 +38,7 @@ def _constants(messages: list[Message]) -> list[str]:
     markers = {name: marker for m in messages for name, marker in m.invalid_markers.items()}
     return [
         f"/* {LICENCE} */",
-        f"/* Messages of the board link: structs, packers, unpackers. {NOTICE} */",
+        f"/* The messages of protocol/README.md. {NOTICE} */",
         "#ifndef ECHOSTEP_MESSAGES_H",
         "#define ECHOSTEP_MESSAGES_H",
         "",
@@ -49,10 +57,9 @@ def _constants(messages: list[Message]) -> list[str]:
 
 def _declaration(message: Message) -> list[str]:
     """Struct and function of one message."""
-    lines = ["", *textwrap.wrap(f"/* {message.doc} */", COMMENT_WIDTH, subsequent_indent=" * ")]
     if not message.fields:
-        return [*lines, f"/* {message.name} has no fields. */"]
-    lines += [f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
+        return []
+    lines = ["", f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
     return [*lines, f"{_signature(message)};"]
 
 
@@ -68,22 +75,33 @@ def _signature(message: Message) -> str:
     return f"bool msg_unpack_{name}(struct msg_{name} *m, const uint8_t *in, uint8_t length)"
 
 
-PUT = """
-static uint8_t *put8(uint8_t *out, uint8_t v)
+PACK = """
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error the messages are copied with their least byte first
+#endif
+
+/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero. Returns the bytes. */
+static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 {
-	*out++ = v;
-	return out;
+	const uint8_t *in = m;
+	uint8_t length = 0, at = 0, size;
+	while ((size = flash_byte(sizes++)) != 0) {
+		uint8_t alignment = size == 4u ? _Alignof(uint32_t) : size == 2u ? _Alignof(uint16_t) : 1u;
+		while (at % alignment)
+			at++;
+		while (size--)
+			out[length++] = in[at++];
+	}
+	return length;
 }
 
-static uint8_t *put16(uint8_t *out, uint16_t v)
-{
-	return put8(put8(out, (uint8_t)(v & 0xFFu)), (uint8_t)(v >> 8));
-}
+#define PACKED(message, ...) \\
+	uint8_t msg_pack_##message(uint8_t *out, const struct msg_##message *m) \\
+	{ \\
+		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0 }; \\
+		return pack(out, m, sizes); \\
+	}
 
-static uint8_t *put32(uint8_t *out, uint32_t v)
-{
-	return put16(put16(out, (uint16_t)(v & 0xFFFFu)), (uint16_t)(v >> 16));
-}
 """
 GET16 = """
 static uint16_t get16(const uint8_t *in)
@@ -96,19 +114,17 @@ static uint16_t get16(const uint8_t *in)
 def c_code(messages: list[Message]) -> str:
     """firmware/messages.c."""
     reads_16_bits = any(f.size == 2 for m in messages if m.direction == "host" for f in m.fields)
-    text = f'/* {LICENCE} */\n/* {NOTICE} */\n#include "messages.h"\n' + PUT + (GET16 if reads_16_bits else "")
-    for message in (m for m in messages if m.fields):
-        body = _pack(message) if message.direction == "board" else _unpack(message)
-        text += "\n".join(["", _signature(message), "{", *body, "}"]) + "\n"
+    includes = '#include "messages.h"\n#include "board.h" /* tables in flash */\n'
+    text = f"/* {LICENCE} */\n/* {NOTICE} */\n" + includes + (GET16 if reads_16_bits else "") + PACK
+    text += "".join(map(_packed, (m for m in messages if m.direction == "board")))
+    for message in (m for m in messages if m.fields and m.direction == "host"):
+        text += "\n".join(["", _signature(message), "{", *_unpack(message), "}"]) + "\n"
     return text
 
 
-def _pack(message: Message) -> list[str]:
-    lines = ["\tuint8_t *end = out;"]
-    for field in message.fields:
-        value = f"(uint16_t)m->{field.name}" if field.wire.signed else f"m->{field.name}"
-        lines.append(f"\tend = put{8 * field.size}(end, {value});")
-    return [*lines, "\treturn (uint8_t)(end - out);"]
+def _packed(message: Message) -> str:
+    sizes = "".join(f", {field.size}" for field in message.fields)
+    return "\n\t".join(textwrap.wrap(f"PACKED({message.name}{sizes})", COMMENT_WIDTH - 8)) + "\n"
 
 
 def _unpack(message: Message) -> list[str]:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Feeds bytes to the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a message into a send
- * buffer of any size. With libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or alone: ./fuzz SEED COUNT. */
+/* Feeds bytes to the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a
+ * message into a send buffer of any size. With libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or alone: ./fuzz SEED
+ * COUNT. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -126,7 +127,8 @@ static size_t frames(uint8_t *out)
 		uint8_t payload[FRAME_PAYLOAD_MAX];
 		for (uint8_t i = 0; i < sizeof payload; i++)
 			payload[i] = (uint8_t)below(3);
-		end += frame_encode(out + end, payload, (uint8_t)(MSG_IDENTIFY + below(4)), (uint16_t)below(65536), (uint8_t)below(7));
+		uint8_t id = (uint8_t)(MSG_IDENTIFY + below(4));
+		end += frame_encode(out + end, payload, id, (uint16_t)below(65536), (uint8_t)below(7));
 		if (below(4) == 0)
 			out[end - 1 - below(5)] ^= (uint8_t)(1u << below(8));
 	}

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Runs the whole portable firmware on a board that does what the input says: bytes from the host, answers of the chips, outcomes of I2C transfers,
- * edges, time. main.c is compiled with -Dmain=firmware_main; its loop ends with the input. With libFuzzer only (make fuzz). */
+/* Runs the whole portable firmware on a board that does what the input says: bytes from the host, answers of the chips,
+ * outcomes of I2C transfers, edges, time. main.c is compiled with -Dmain=firmware_main; its loop ends with the input.
+ * With libFuzzer only (make fuzz). */
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,9 +64,16 @@ bool twi_watch(uint32_t at)
 }
 
 uint8_t spi_exchange(uint8_t out) { (void)out; return next(); }
-uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first) { (void)chip; (void)protocol; return spi_exchange(first); }
+uint8_t spi_begin(enum chip chip, enum spi_protocol protocol, uint8_t first)
+{
+	(void)chip, (void)protocol;
+	return spi_exchange(first);
+}
 void spi_release(void) {}
-void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value) { (void)chip; (void)protocol; (void)address; (void)value; }
+void spi_write(enum chip chip, enum spi_protocol protocol, uint8_t address, uint8_t value)
+{
+	(void)chip, (void)protocol, (void)address, (void)value;
+}
 bool spi_pressure_ready(void) { return next() & 1; }
 void spi_excite_gyros(enum excitation excitation) { (void)excitation; }
 

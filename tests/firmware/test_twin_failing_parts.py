@@ -89,7 +89,7 @@ WHILE_RUNNING = [
 FROM_THE_START = [
     *failures("", "scp1000", "pressure", ("no_eeprom", m.Fault.EEPROM, "barometer: EEPROM"), ("no_start", m.Fault.NEVER_STARTED, "barometer: ")),
     *failures(
-        "part_pressure=bmp390", "bmp390", "pressure", ("empty", m.Fault.EEPROM, "barometer (BMP390): its calibration is empty"),
+        "part_pressure=bmp390", "bmp390", "pressure", ("empty", m.Fault.EEPROM, "barometer (BMP390): its calibration reads with a wrong check sum"),
         ("wrong_identity", None, "barometer: holds a part that the firmware does not know (identity register 0x58)"),
     ),
     *failures("part_thigh=lsm6dso", "imu_thigh", "thigh", ("wrong_identity", None, "thigh gyro: ")),

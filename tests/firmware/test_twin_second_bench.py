@@ -39,14 +39,6 @@ DAY_ONE = [
 ]
 
 
-def empty_rows(milliseconds: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    """Rows of an empty room: no echo, all parts at rest."""
-    table = np.zeros(milliseconds, EXTENDED_ROW)
-    table["row"]["sync_us"], table["row"]["pressure"] = NO_SYNC, 405_296
-    table["motion"]["force"][:, :, 2] = 1_024
-    return table
-
-
 def findings(bench: Bench) -> list[Finding]:
     """All findings on all reports, as `echostep doctor --electrical` makes them."""
     reports, found = BoardReports(), []
@@ -61,9 +53,9 @@ def findings(bench: Bench) -> list[Finding]:
 def run_with(bench: Bench, *faults: str) -> list[str]:
     for fault in faults:
         bench.fault(fault)
-    bench.run(300, empty_rows(300))
+    bench.run(300, rows(300))
     bench.ask(SUBSCRIBE_ELECTRICAL)
-    bench.run(6_000, empty_rows(6_000))
+    bench.run(6_000, rows(6_000))
     return [str(finding) for finding in findings(bench)]
 
 
@@ -207,24 +199,6 @@ def test_ghosts_of_the_schedules(bench: Bench, schedule: m.Schedule, crosses: bo
         assert (
             np.abs(np.subtract.outer(*fired)).min(axis=0).max() < 3_000
         )  # 1.5 ms: one transfer on the bus after the other
-
-
-@pytest.mark.parametrize("errors", [1, 3])
-def test_one_wrong_byte_in_a_thousand_is_seen(bench: Bench, errors: int) -> None:
-    """N3: status bits and the reserved byte are known in every sample."""
-    begin(bench, "kit=2026", f"spi_errors={errors}")
-    bench.run(6_000, rows(6_000))
-    assert [text for text in findings_of(bench) if "(LSM6DSO): sent wrong bits" in text]
-
-
-def test_a_part_that_is_confused_by_i3c_answers_after_each_reset(bench: Bench) -> None:
-    """N5: after a reset of the processor alone, such a part's identity reads 0 until I3C is off."""
-    begin(bench, "kit=2026", "bootloader=none", *(f"imu_{place}=i3c" for place in ("thigh", "calf", "belt")))
-    for _ in range(3):
-        bench.fault("reset=external")
-        bench.run(2_500, rows(2_500))
-    gyros = m.Healthy.THIGH | m.Healthy.CALF | m.Healthy.BELT
-    assert bench.status.healthy & gyros == gyros
 
 
 def test_a_ghost_after_a_silence_is_a_silence(bench: Bench) -> None:

@@ -47,16 +47,6 @@ def test_every_tool_says_what_it_is_for(name: str, start: Start, capsys: pytest.
     assert len(said.partition("options:")[0]) > 60
 
 
-@pytest.mark.process
-def test_kills(tmp_path: Path, start: Start, capsys: pytest.CaptureFixture[str]) -> None:
-    for kills in (1, 2):
-        assert (
-            start("reliability.kill_recorder", "--kills", kills, "--longest", 0.3, "--out", tmp_path / "a.jsonl") == 0
-        )
-        assert capsys.readouterr().out.count("PASS") == 3
-    assert len((tmp_path / "a.jsonl").read_text().splitlines()) == 2
-
-
 @needs_twin
 def test_measured_seconds_of_the_firmware(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     start("twin.measure", "--minutes", 0.1)

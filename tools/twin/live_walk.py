@@ -43,13 +43,12 @@ LIVE = (sys.executable, "-m", "echostep")
 
 
 class HostFault(NamedTuple):
-    """What `begin` does at BEGIN_S, and `end` after `seconds` (None: it stays). `options` of the live run; `program`: in the place of LIVE."""
+    """What `begin` does at BEGIN_S, and `end` after `seconds` (None: it stays). `program`: in the place of LIVE."""
 
     name: str
     begin: Callable[[LiveWalk], None] | None = None
     end: Callable[[LiveWalk], None] | None = None
     seconds: float = 0.0
-    options: Sequence[str] = ("--headless",)
     program: Sequence[str] = LIVE
     prepare: Callable[[LiveWalk], None] | None = None  # before the run starts
 
@@ -116,9 +115,7 @@ class LiveWalk:
         self.runs[-1].mkdir(exist_ok=True)
         ports = ("--board", str(self.folder / "board"), "--mtx", str(self.folder / "mtx"))
         command = [*self.fault.program, "live", "--plan", str(PLAN), *ports, "--out", str(self.runs[-1])]
-        self.live = subprocess.Popen(
-            [*command, *self.fault.options, *options], stdout=self.output, stderr=subprocess.STDOUT
-        )
+        self.live = subprocess.Popen([*command, "--headless", *options], stdout=self.output, stderr=subprocess.STDOUT)
 
     @property
     def process(self) -> subprocess.Popen[bytes]:

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * The twin: an unmodified ATmega32U4 ELF in simavr, with models of buses, devices and a USB host.
  *
- * simavr's own USB, TWI and SPI are replaced, through its public tables, by models with true timing: usb_device.c, twi.c, spi.c.
- * Everything happens in simulated time; equal input gives equal output. */
+ * simavr's own USB, TWI and SPI are replaced, through its public tables, by models with true timing: usb_device.c,
+ * twi.c, spi.c. Everything happens in simulated time; equal input gives equal output. */
 #ifndef ECHOSTEP_TWIN_H
 #define ECHOSTEP_TWIN_H
 
@@ -46,7 +46,8 @@ extern uint64_t random_state; /* for everything that varies from part to part */
 
 uint32_t random_below(uint32_t limit);
 uint8_t disturbed(uint8_t byte, unsigned errors); /* with one wrong bit in so many of 1000 cases */
-void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2))); /* one line on stderr, exit status 2 */
+/* one line on stderr, exit status 2 */
+void fail(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 avr_int_vector_t *vector(int number);
 
 bool pin_is_output(char port, uint8_t pin);
@@ -66,7 +67,8 @@ void take_register(avr_io_addr_t address, avr_io_read_t read, avr_io_write_t wri
 struct fault_switch {
 	const char *name;
 	const char *values; /* with blanks between them, or "<=" and the largest number */
-	void (*changed)(void *self, unsigned before); /* of this switch, or what begins with it; NULL: nothing else happens */
+	/* of this switch, or what begins with it; NULL: nothing else happens */
+	void (*changed)(void *self, unsigned before);
 	unsigned value;                               /* in force: which of the values, or the number */
 	struct fault_switch *next;
 };
@@ -93,7 +95,8 @@ void bench_init(void);
 void bench_run(void);
 
 /* usb_device.c: the device controller, from the cable's side. */
-enum usb_event { USB_SUSPEND = 1, USB_FRAME = 4, USB_RESET = 8, USB_RESUME = 16 }; /* flags of UDINT; a bus is suspended after 3 ms without traffic */
+/* flags of UDINT; a bus is suspended after 3 ms without traffic */
+enum usb_event { USB_SUSPEND = 1, USB_FRAME = 4, USB_RESET = 8, USB_RESUME = 16 };
 void usb_device_init(void);
 void usb_device_reset(void);
 bool usb_device_attached(void);
@@ -107,7 +110,8 @@ int usb_setup(const uint8_t *request);
 int usb_in(uint8_t endpoint, uint8_t *bytes); /* returns the length, or a usb_answer */
 int usb_out(uint8_t endpoint, const uint8_t *bytes, unsigned length);
 
-/* usb_systems.c: the requests of an operating system in its order; each step is a request, or begins with one of these: */
+/* usb_systems.c: the requests of an operating system in its order; each step is a request, or begins with one of
+ * these: */
 enum { USB_STEPS_END = 0xFE, USB_STEP_BUS_RESET = 0xFF };
 const uint8_t *usb_system_step(unsigned step);
 
@@ -120,6 +124,7 @@ void usb_hub_clear(void);
 /* usb_host.c: enumerates the device, opens the port, moves bytes. */
 void usb_host_start(void);   /* after power-up: registers its timer */
 void usb_host_unplug(void);
+void usb_host_reset(void);   /* of the bus, after which it is enumerated again */
 void usb_host_open(bool on); /* a program has the port open (DTR) */
 void usb_host_send(const uint8_t *bytes, unsigned length);
 
@@ -150,7 +155,8 @@ void board_init(void); /* the first power-up */
 void board_power(bool on);
 void board_reset(uint8_t cause);
 bool has_series_resistor(char port, uint8_t pin); /* that keeps two outputs on its net apart */
-bool board_runs(void); /* once a millisecond: whether the program runs; without power, and in the bootloader, it does not */
+/* once a millisecond: whether the program runs; without power, and in the bootloader, it does not */
+bool board_runs(void);
 
 /* floating.c: the capture inputs while nothing drives them. */
 void floating_pin(char port, uint8_t pin, bool open);

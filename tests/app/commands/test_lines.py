@@ -8,6 +8,7 @@ import os
 import re
 import socket
 import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -34,10 +35,16 @@ from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineR
 from foot.foot_walks import MANNERS, course, samples
 from free_ports import free_port
 from players import pseudo_terminal
-from twin.line_foot import lines, paced
 from waiting import until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
+DEVICE = """
+import sys, time
+began_s = time.monotonic()
+for line in open(sys.argv[1]):
+    time.sleep(max(0.0, float(line.split(",")[0].replace("t_s", "0")) - (time.monotonic() - began_s)))
+    print(line, end="", flush=True)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +55,15 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     kept = (t_s > 1.5) & (t_s < t_s[-1] - 1.5)
     np.savetxt(file, np.column_stack([t_s, accel, gyro])[kept], delimiter=",", header=HEADER, comments="", fmt="%.9g")
     return file
+
+
+def lines(path: Path) -> list[str]:
+    """What a device prints: samples, and each second the names of the columns."""
+    imu = load_foot(path)
+    samples = np.column_stack([np.round(imu.t_s - imu.t_s[0], 6), imu.accel, imu.gyro]).tolist()
+    named = {int(np.searchsorted(imu.t_s - imu.t_s[0], second)) for second in range(int(np.ptp(imu.t_s)) + 1)}
+    printed = [[HEADER] * (k in named) + [",".join(f"{x:.6g}" for x in each)] for k, each in enumerate(samples)]
+    return [line for each in printed for line in each]
 
 
 @contextmanager
@@ -82,7 +98,7 @@ def udp() -> Iterator[tuple[str, Callable[[bytes], object]]]:
 @pytest.mark.parametrize("kind", [terminal, tcp, udp])
 def test_each_kind_of_port_gives_the_samples(kind: Callable[[], object], walk: Path) -> None:
     """The columns are named behind the port, as for a device that prints samples alone."""
-    sent = [line.encode() + b"\n" for _, line in lines(walk) if line != HEADER]
+    sent = [line.encode() + b"\n" for line in lines(walk) if line != HEADER]
     pace_s = max(map(len, sent)) / (0.8 * BYTES_A_SECOND) if kind is udp else 0.0005  # of datagrams no more are taken
     with kind() as (port, send):  # type: ignore[attr-defined]
         foot = f"lines:{port}#{HEADER}"
@@ -119,20 +135,19 @@ def test_a_live_run_without_a_board_is_replayed_bit_for_bit(walk: Path, tmp_path
     walls = [[-9, -9, 9, -9], [9, -9, 9, 40], [9, 40, -9, 40], [-9, 40, -9, -9]]
     plan.write_text(json.dumps({"echostep_plan": 1, "name": "Hall", "levels": [{"name": "0", "walls": walls}]}))
     live = ("live", "--foot", "lines:-", "--plan", plan, "--start", "1,2,90", "--headless", "--out", tmp_path)
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen([*PROGRAM, *map(str, live)], text=True, **pipes) as running:  # type: ignore[call-overload]
-        assert running.stdin
-        for line in paced(walk):
-            running.stdin.write(f"{line}\n")
-            running.stdin.flush()
-        out, err = running.communicate()
-    assert running.returncode == 0, err
-    assert "foot in lines: 100 Hz; 0 lines were no sample" in out
+    (tmp_path / "lines.csv").write_text("".join(f"{line}\n" for line in lines(walk)))
+    device_command = [sys.executable, "-c", DEVICE, str(tmp_path / "lines.csv")]
+    with subprocess.Popen(device_command, stdout=subprocess.PIPE) as device:
+        done = subprocess.run(
+            [*PROGRAM, *map(str, live)], check=False, stdin=device.stdout, capture_output=True, text=True
+        )
+    assert done.returncode == 0, done.stderr
+    assert "foot in lines: 100 Hz; 0 lines were no sample" in done.stdout
     again = run("replay", tmp_path / "walk.mcap", "--plan", plan, "--headless", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
     assert (tmp_path / "again/track.csv").read_bytes() == (tmp_path / "track.csv").read_bytes()
     text = b"".join(chunk.data for chunk in open_recording(tmp_path / "walk.mcap").chunks() if chunk.port == LINES)
-    assert text.decode().split("\n")[:-1] == [line for _, line in lines(walk)]
+    assert text.decode().split("\n")[:-1] == lines(walk)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
 from echostep_app.recording.background_writer import BackgroundWriter
 from echostep_app.recording.recorder import RAW_LIMIT, Recorder
-from reliability.kill_recorder import kill_once
+from recording.killed import kill_once
 from waiting import PATIENCE_S, ends, until
 
 FULL_DISK = """
@@ -27,6 +27,7 @@ import resource, sys, time
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
 from echostep_app.recording.recorder import Recorder
 from echostep.ports.chunks import Chunk
+from recording.killed import kill_once
 from waiting import until
 recorder = Recorder(sys.argv[1], {})
 for n in range(1000):
@@ -44,10 +45,10 @@ print(*recorder.notices, sep="\\n")
 
 
 @pytest.mark.process
-def test_a_killed_recorder_has_lost_less_than_a_second_and_no_earlier_recording(tmp_path: Path) -> None:
-    """The small version of `make kill`."""
+@pytest.mark.parametrize("kills", [2, pytest.param(200, marks=pytest.mark.long)])
+def test_a_killed_recorder_has_lost_less_than_a_second_and_no_earlier_recording(tmp_path: Path, kills: int) -> None:
     rng = random.Random(7)
-    for _ in range(2):
+    for _ in range(kills):
         kill = kill_once(tmp_path / "walk.mcap", rng.uniform(0.1, 0.8))
         assert kill.opens
         assert kill.missing_s <= 1.0

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The bench protocol (host/docs/design/bench.md): rows, host bytes and faults in; board bytes, traces and acknowledgements out. */
+ * The bench protocol (host/docs/design/bench.md): rows, host bytes and faults in; board bytes, traces and
+ * acknowledgements out. */
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -72,7 +73,8 @@ static bool read_all(void *into, size_t length)
 	return done == length;
 }
 
-/* With a pulse ranger on the left, its echo line is where SyncOut would be; on a foot board it is the data-ready line. */
+/* With a pulse ranger on the left, its echo line is where SyncOut would be; on a foot board it is the data-ready
+ * line. */
 void bench_sync(bool level)
 {
 	if (place_has(PLACE_RANGER_LEFT, OF_PAPERS))
@@ -144,7 +146,8 @@ static void swap_sensors(void)
 	}
 }
 
-/* What parts of more axes measure where the row has only those of the papers: rates about z, z up, a field by the bearing. */
+/* What parts of more axes measure where the row has only those of the papers: rates about z, z up, a field by the
+ * bearing. */
 static void extend_row(void)
 {
 	double bearing = input.row.bearing * 3.14159265358979 / 1800.0;

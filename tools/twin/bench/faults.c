@@ -45,10 +45,10 @@ void switch_fault(char *text)
 		fail("fault '%s' is not name=value", text);
 	*value++ = 0;
 	for (struct fault_switch *s = switches; s; s = s->next) {
-		int choice = strcmp(text, s->name) ? -1 : *s->values == '<' ? number_of(s->values + 2, value) : choice_of(s->values, value);
+		int choice = *s->values == '<' ? number_of(s->values + 2, value) : choice_of(s->values, value);
 		unsigned before = s->value;
 
-		if (choice < 0)
+		if (choice < 0 || strcmp(text, s->name))
 			continue;
 		s->value = (unsigned)choice;
 		if (s->changed)

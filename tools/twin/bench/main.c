@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * echostep-twin: runs the firmware's ELF on a simulated board; the bench protocol on standard input is the board's input. */
+ * echostep-twin: runs the firmware's ELF on a simulated board; the bench protocol on standard input is the board's
+ * input. */
 #include <elf.h>
 #include <getopt.h>
 #include <signal.h>
@@ -90,7 +91,8 @@ void set_pin(char port, uint8_t pin, bool level)
 	avr_raise_irq(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(port), pin), level);
 }
 
-/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external level. */
+/* The level is set in two ways: when the program writes to the port with the pull-up on, simavr keeps only an external
+ * level. */
 static void set_driven(char port, uint8_t pin, bool by_chip, bool level)
 {
 	avr_ioport_external_t *d = &driven[port - 'B'];
@@ -221,7 +223,8 @@ int main(int argc, char **argv)
 		case 'f': switch_fault(optarg); break; /* of constants: those that act at once need a board */
 		case 'p': with_pty = true; break;
 		case 'h':
-			printf("echostep-twin --elf FILE [--seed N] [--fault NAME=VALUE] [--pty]\nThe bench protocol on standard input and output; see README.md.\n");
+			puts("echostep-twin --elf FILE [--seed N] [--fault NAME=VALUE] [--pty]");
+			puts("The bench protocol on standard input and output; see README.md.");
 			return 0;
 		default: return 2;
 		}

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Power, supply voltage and resets of the board, and what the bootloader Caterina does after a reset.
  *
- * Caterina [its source, Arduino 1.8] clears MCUSR and its key, starts the program at once after a loss of power, or after a watchdog reset
- * without the key, and else waits for 8 s as another USB device. Then it detaches, leaves the controller on, and jumps to the program.
+ * Caterina [its source, Arduino 1.8] clears MCUSR and its key, starts the program at once after a loss of power, or
+ * after a watchdog reset without the key, and else waits for 8 s as another USB device. Then it detaches, leaves the
+ * controller on, and jumps to the program.
  *
- * What it leaves [Caterina.c, StartSketch and SetupHardware; Caterina.h of the boards Leonardo and Micro]: the LEDs of PB0 and PD5 off, so with a
- * one in their ports; after a wait, those pins and PC7 are outputs, and Timer1, which ran with a falling edge for its capture, has left its flags. */
+ * What it leaves [Caterina.c, StartSketch and SetupHardware; Caterina.h of the boards Leonardo and Micro]: the LEDs of
+ * PB0 and PD5 off, so with a one in their ports; after a wait, those pins and PC7 are outputs, and Timer1, which ran
+ * with a falling edge for its capture, has left its flags. */
 #include <string.h>
 
 #include "twin.h"
@@ -23,7 +25,8 @@ enum { DDRB = 0x24, PORTB, DDRC = 0x27, PORTC, DDRD = 0x2A, PORTD, RX_LED = 0x01
 #define REFERENCE_SPREAD_MV 33 /* 3 %, from chip to chip; the data sheet allows 9 % */
 #define MEMORY_MV 1300         /* below it, memory is lost and the next reset is one of power-on */
 #define CHIPS_MV 3000          /* below it, the sensors start anew */
-#define RELIABLE_MV 3600       /* below it, a processor at 16 MHz hangs; an example of what may happen below the specified 4500 */
+/* below it, a processor at 16 MHz hangs; an example of what may happen below the specified 4500 */
+#define RELIABLE_MV 3600
 #define BROWN_OUT_HYSTERESIS_MV 50
 
 static void supply_changed(void *self, unsigned before);
@@ -119,7 +122,8 @@ bool has_series_resistor(char port, uint8_t pin)
 	return echo_resistor.value && ((port == 'C' && pin == 7) || (port == 'D' && pin == 4));
 }
 
-/* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo line. */
+/* While the bootloader waits, its LED breathes: PC7 is driven high and low by turns, against what drives the right echo
+ * line. */
 static void breathe(void)
 {
 	bool level = bootloader_ms & 1;
@@ -148,7 +152,8 @@ static void end_bootloader(void)
 	bench_trace("program starts");
 }
 
-/* The lamp of RX, which a Micro lights by a one and a Leonardo by a zero [Caterina.h; variants/micro/pins_arduino.h]. */
+/* The lamp of RX, which a Micro lights by a one and a Leonardo by a zero [Caterina.h;
+ * variants/micro/pins_arduino.h]. */
 static void watch_lamp(void)
 {
 	static bool was;

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Registers of the ATmega32U4 that simavr lacks or has wrongly: JTAG, the signature row, the flags of Timer1 and Timer3.
+ * Registers of the ATmega32U4 that simavr lacks or has wrongly: JTAG, the signature row, the flags of Timer1 and
+ * Timer3.
  *
- * JTAG, where its fuse is programmed, owns PF4 to PF7 (A3 to A0) until the program has written a one to JTD of MCUCR twice within four cycles
- * [data sheet, chapter 26.5.1]. Boards are sold with the fuse unprogrammed.
+ * JTAG, where its fuse is programmed, owns PF4 to PF7 (A3 to A0) until the program has written a one to JTD of MCUCR
+ * twice within four cycles [data sheet, chapter 26.5.1]. Boards are sold with the fuse unprogrammed.
  *
- * The signature row holds the chip's own number, another one for each seed. An LPM within three cycles of a write to SPMCSR reads it; simavr
- * knows only flash. The vectors there are of interrupts that the firmware does not use.
+ * The signature row holds the chip's own number, another one for each seed. An LPM within three cycles of a write to
+ * SPMCSR reads it; simavr knows only flash. The vectors there are of interrupts that the firmware does not use.
  *
- * A one that is written to a timer's flag register clears its flag, and no other [14.10.18]. simavr 1.6 clears every flag that is set, so that an
- * overflow during a capture's interrupt was lost. A flag that is set already interrupts when its interrupt is enabled [chapter 9]; in simavr it is
- * forgotten. */
+ * A one that is written to a timer's flag register clears its flag, and no other [14.10.18]. simavr 1.6 clears every
+ * flag that is set, so that an overflow during a capture's interrupt was lost. A flag that is set already interrupts
+ * when its interrupt is enabled [chapter 9]; in simavr it is forgotten. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>

@@ -11,8 +11,9 @@ static double cycles = CYCLES_PER_MS; /* in the millisecond under way */
 static double begin, end;             /* of it, in cycles */
 static uint64_t begin_ns;
 
-/* Parts per million by which the processor is fast. An AT cut follows a cubic in the temperature, within 10 ppm from -10 to 60 degC; a
- * ceramic resonator is two orders of magnitude worse [both: typical curves of makers' data sheets]. */
+/* Parts per million by which the processor is fast. An AT cut follows a cubic in the temperature, within 10 ppm from
+ * -10 to 60 degC; a ceramic resonator is two orders of magnitude worse [both: typical curves of makers' data
+ * sheets]. */
 static double fast_ppm(void)
 {
 	double t = input.row.temperature / 20.0 - 25.0;

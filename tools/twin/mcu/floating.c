@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Open inputs: what a pin reads that nothing drives. With its pull-up (20 to 50 kohm [ATmega32U4 data sheet, table 29-1]) it reads one; without,
- * it follows the mains hum that its wire picks up, if the fault `hum` plays any, else it reads zero.
+ * Open inputs: what a pin reads that nothing drives. With its pull-up (20 to 50 kohm [ATmega32U4 data sheet, table
+ * 29-1]) it reads one; without, it follows the mains hum that its wire picks up, if the fault `hum` plays any, else it
+ * reads zero.
  *
- * D13 of a Micro is none of these: 1 kohm and a green LED to ground hold it at 1.8 to 2.4 V against the pull-up [makers' netlists; computed], between
- * the input's thresholds: it may read either, or change. On a Leonardo a buffer is in between (`leonardo`). */
+ * D13 of a Micro is none of these: 1 kohm and a green LED to ground hold it at 1.8 to 2.4 V against the pull-up
+ * [makers' netlists; computed], between the input's thresholds: it may read either, or change. On a Leonardo a buffer
+ * is in between (`leonardo`). */
 #include <simavr/sim_cycle_timers.h>
 
 #include "twin.h"

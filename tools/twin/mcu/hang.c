@@ -40,7 +40,8 @@ void hang_spi_selected(void)
 		hang_now();
 }
 
-/* The next millisecond begins. It is the main loop that hangs, not an interrupt: within one of these the next millisecond is awaited. */
+/* The next millisecond begins. It is the main loop that hangs, not an interrupt: within one of these the next
+ * millisecond is awaited. */
 void hang_millisecond(void)
 {
 	if (cpu.value == HANGS && avr->sreg[S_I])

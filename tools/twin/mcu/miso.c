@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The level of MISO while no part drives it, by the resistors on it: the processor's pull-up, and those of the boards that are plugged in [nets of
- * the makers' Eagle files: Adafruit 4438 R2 SDO-GND, 4464 R1 AD0-GND, 4816 R4 SDO-3.3V, 757 10 kohm to either supply].
+ * The level of MISO while no part drives it, by the resistors on it: the processor's pull-up, and those of the boards
+ * that are plugged in [nets of the makers' Eagle files: Adafruit 4438 R2 SDO-GND, 4464 R1 AD0-GND, 4816 R4 SDO-3.3V,
+ * 757 10 kohm to either supply].
  *
- * An input reads a zero up to 0.2 VCC - 0.1 V and a one from 0.2 VCC + 0.9 V on [ATmega32U4 data sheet, table 29-1, from memory]. Between the two
- * it may read either, or change from bit to bit: the fault `miso_undefined` chooses. */
+ * An input reads a zero up to 0.2 VCC - 0.1 V and a one from 0.2 VCC + 0.9 V on [ATmega32U4 data sheet, table 29-1,
+ * from memory]. Between the two it may read either, or change from bit to bit: the fault `miso_undefined` chooses. */
 #include "parts/parts.h"
 
 #define PROCESSOR_OHM 35000.0 /* pull-up of 20 to 50 kohm [table 29-1] */

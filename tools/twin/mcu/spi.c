@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * SPI master with the clock of SPCR and SPSR (in simavr a byte takes 100 us), and chip selects on port pins.
  *
- * In modes 1 and 2 the processor changes MOSI at the rising edge at which parts of modes 0 and 3 sample it. Their level shifters let lines fall
- * fast and rise slowly, so that such a part reads a one only where the bit before and the bit after the edge are both ones, and its answers
- * arrive one bit late. The bit behind a byte is assumed to be a zero. */
+ * In modes 1 and 2 the processor changes MOSI at the rising edge at which parts of modes 0 and 3 sample it. Their level
+ * shifters let lines fall fast and rise slowly, so that such a part reads a one only where the bit before and the bit
+ * after the edge are both ones, and its answers arrive one bit late. The bit behind a byte is assumed to be a zero. */
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_spi.h>
 #include <simavr/sim_cycle_timers.h>
@@ -19,6 +19,7 @@ static struct spi_device *devices;
 static avr_irq_t *miso;
 static uint8_t outgoing;
 FAULT_SWITCH(spi_errors, "<=1000", NULL, 0) /* bytes in 1000 that a part sends and that arrive with a wrong bit */
+FAULT_SWITCH(mosi_errors, "<=1000", NULL, 0) /* the same of those from the processor */
 
 static unsigned divisor(void)
 {
@@ -90,7 +91,7 @@ static void write_byte(avr_t *a, avr_io_addr_t address, uint8_t value, void *par
 	if ((a->data[SPCR] & (SPE | MSTR)) != (SPE | MSTR))
 		return;
 	avr_regbit_clear(a, vector(VECTOR)->raised);
-	outgoing = value;
+	outgoing = disturbed(value, mosi_errors.value);
 	avr_cycle_timer_register(a, divisor() * 8 + 1, done, NULL);
 }
 
@@ -120,7 +121,9 @@ void spi_reset(void)
 
 void spi_add(struct spi_device *device)
 {
+	avr_irq_t *pin = avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(device->port), device->pin);
+
 	device->next = devices;
 	devices = device;
-	avr_irq_register_notify(avr_io_getirq(avr, (uint32_t)AVR_IOCTL_IOPORT_GETIRQ(device->port), device->pin), select_changed, device);
+	avr_irq_register_notify(pin, select_changed, device);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Two-wire interface, master mode [ATmega32U4 data sheet, chapter 20]: bit timing of TWBR and TWSR, devices on the bus, clock
- * stretching, an SDA line that a device may hold low until it has received nine clocks, and an SCL line that one may hold low. */
+ * Two-wire interface, master mode [ATmega32U4 data sheet, chapter 20]: bit timing of TWBR and TWSR, devices on the bus,
+ * clock stretching, an SDA line that a device may hold low until it has received nine clocks, and an SCL line that one
+ * may hold low. */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
@@ -135,7 +136,8 @@ static void address(uint8_t byte)
 	operate_byte(reading ? STATUS_READ_ADDRESS : STATUS_WRITE_ADDRESS, active);
 }
 
-/* A device holds SDA low: a one that the master sends reads back as a zero, as if another master had won the arbitration. */
+/* A device holds SDA low: a one that the master sends reads back as a zero, as if another master had won the
+ * arbitration. */
 static void lose_arbitration(uint8_t byte)
 {
 	unsigned zeros = 0;
@@ -158,7 +160,8 @@ static void transfer(uint8_t control)
 	case ADDRESS: address(byte); break;
 	case WRITING_FIRST:
 	case WRITING:
-		operate_byte(STATUS_WRITE, active->part.model->write(active, disturbed(byte, twi_errors.value), phase == WRITING_FIRST));
+		byte = disturbed(byte, twi_errors.value);
+		operate_byte(STATUS_WRITE, active->part.model->write(active, byte, phase == WRITING_FIRST));
 		phase = WRITING;
 		break;
 	case READING:
@@ -243,7 +246,9 @@ void twi_init(void)
 	take_register(TWSR, NULL, write_status);
 	avr->io[AVR_DATA_TO_IO(TWDR)].r.c = NULL; /* a byte of memory */
 	avr->io[AVR_DATA_TO_IO(TWDR)].w.c = NULL;
-	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL), lines_changed, NULL);
+	avr_irq_t *port = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL);
+
+	avr_irq_register_notify(port, lines_changed, NULL);
 }
 
 void twi_reset(void)

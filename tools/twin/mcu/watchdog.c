@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Watchdog with interrupt and reset [ATmega32U4 data sheet, chapter 8]. simavr's own raises its interrupt for ever when interrupts are off,
- * and does not follow a new period. */
+ * Watchdog with interrupt and reset [ATmega32U4 data sheet, chapter 8]. simavr's own raises its interrupt for ever when
+ * interrupts are off, and does not follow a new period. */
 #include <simavr/avr_watchdog.h>
 #include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>

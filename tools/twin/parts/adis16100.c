@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Three ADIS16100 rate gyros [data sheet; public drivers for what it does not state].
  *
- * 16-bit frames; the answer to a frame comes with the next one: channel in bits 13:12, value in 11:0. Bit 15 writes the control register:
- * channel 11:10 (rate, temperature, AIN1, AIN2), power 9:8 (11 = on), coding bit 4 (1 = offset binary).
+ * 16-bit frames; the answer to a frame comes with the next one: channel in bits 13:12, value in 11:0. Bit 15 writes the
+ * control register: channel 11:10 (rate, temperature, AIN1, AIN2), power 9:8 (11 = on), coding bit 4 (1 = offset
+ * binary).
  *
- * ST1 (PF7) and ST2 (PF6), wired to all three, change the rate by -221 and +221 counts, through the 40 Hz filter; the response varies by
- * a tenth from part to part. The temperature is the row's, 6.88 counts per degree from 25 degC. */
+ * ST1 (PF7) and ST2 (PF6), wired to all three, change the rate by -221 and +221 counts, through the 40 Hz filter; the
+ * response varies by a tenth from part to part. The temperature is the row's, 6.88 counts per degree from 25 degC. */
 #include <math.h>
 #include <string.h>
 
@@ -72,7 +73,8 @@ static int rate_of(const struct gyro *g)
 static uint16_t convert(const struct gyro *g)
 {
 	unsigned channel = (g->control >> 10) & 3;
-	int value = channel == 0 ? rate_of(g) : channel == 1 ? (int)lround((input.row.temperature / 20.0 - 25.0) * 6.88) : 0;
+	int warmth = (int)lround((input.row.temperature / 20.0 - 25.0) * 6.88);
+	int value = channel == 0 ? rate_of(g) : channel == 1 ? warmth : 0;
 
 	if ((g->control & POWER_ON) != POWER_ON)
 		return 0;

@@ -1,24 +1,32 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first, and a frame writes one byte.
+ * BMP390 barometer on SPI [BST-BMP390-DS002]: modes 0 and 3, at most 10 MHz; a read returns a dummy byte first, and a
+ * frame writes one byte.
  *
- * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears it. The counts are
- * those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and temperature: found by bisection. */
+ * In normal mode it measures at 200 Hz / 2^ODR; a measurement sets its bit in STATUS, and reading the pressure clears
+ * it. The counts are those from which the data sheet's compensation (8.5, 8.6) returns the row's pressure and
+ * temperature: found by bisection. */
 #include <math.h>
 #include <string.h>
 
 #include "parts/parts.h"
 
-enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, COEFFICIENTS = 0x31, CMD = 0x7E, REGISTERS = 0x80 };
-enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, THREE_WIRES = 1, SOFT_RESET = 0xB6 };
+enum { CHIP_ID = 0x00, REV_ID, ERR_REG, STATUS, DATA, IF_CONF = 0x1A, PWR_CTRL, OSR, ODR, CONFIG = 0x1F };
+enum { CHECKSUM = 0x30, COEFFICIENTS, CMD = 0x7E, REGISTERS = 0x80 };
+enum { READY_FOR_COMMANDS = 0x10, PRESSURE_READY = 0x20, TEMPERATURE_READY = 0x40, NORMAL = 0x30, BOTH = 3 };
+enum { THREE_WIRES = 1, SOFT_RESET = 0xB6 };
 enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, EMPTY, STUCK_READY, NEVER_READY };
 #define IDENTITY 0x60
 #define OTHER_IDENTITY 0x58 /* a BMP280 */
 #define START_UP US(2000)
 #define FASTEST US(5000)
+#define COEFFICIENTS_SIZE 21
 #define FULL_SCALE 0xFFFFFFu
 
-static struct register_file chips[] = { { .spi = { .part = PART(bmp390, PLACE_PRESSURE, "bmp390"), .port = 'D', .pin = 7 } } };
+static struct register_file chips[] = {
+	{ .spi = { .part = PART(bmp390, PLACE_PRESSURE, "bmp390"), .port = 'D', .pin = 7 } },
+};
 static uint8_t registers[REGISTERS];
+static double low_pass[2]; /* counts of pressure and temperature; 0: none yet */
 
 /* PAR_T1 ... PAR_P11 of a typical part, as integers, and their powers of two [8.4]. */
 enum { T1, T2, T3, P1, P2, P3, P4, P5, P6, P7, P8, P9, P10, P11, PARAMETERS };
@@ -26,9 +34,9 @@ static struct parameter {
 	int value, size, power;
 	double offset;
 } parameters[PARAMETERS] = {
-	{ 28159, 2, 8, 0 }, { 18902, 2, -30, 0 }, { -10, 1, -48, 0 }, { 773, 2, -20, 16384 }, { -1377, 2, -29, 16384 }, { 35, 1, -32, 0 },
-	{ 0, 1, -37, 0 }, { 25011, 2, 3, 0 }, { 30127, 2, -6, 0 }, { 3, 1, -8, 0 }, { -7, 1, -15, 0 }, { 16194, 2, -48, 0 }, { 6, 1, -48, 0 },
-	{ -60, 1, -65, 0 },
+	{ 28159, 2, 8, 0 }, { 18902, 2, -30, 0 }, { -10, 1, -48, 0 }, { 773, 2, -20, 16384 }, { -1377, 2, -29, 16384 },
+	{ 35, 1, -32, 0 }, { 0, 1, -37, 0 }, { 25011, 2, 3, 0 }, { 30127, 2, -6, 0 }, { 3, 1, -8, 0 }, { -7, 1, -15, 0 },
+	{ 16194, 2, -48, 0 }, { 6, 1, -48, 0 }, { -60, 1, -65, 0 },
 };
 
 static double par(int k)
@@ -74,14 +82,54 @@ static void put24(uint8_t at, uint32_t value)
 		registers[at + k] = (uint8_t)(value >> 8 * k);
 }
 
+/* Time that a measurement takes [3.9.2, from memory]. */
+static unsigned conversion_us(void)
+{
+	unsigned pressure = 1u << (registers[OSR] & 7), temperature = 1u << (registers[OSR] >> 3 & 7);
+
+	return 234 + 392 + 2020 * pressure + 163 + 2020 * temperature;
+}
+
+/* Of normal mode; 0: asleep, or a conversion would be longer than its period [3.9.2]. */
+static avr_cycle_count_t period(void)
+{
+	avr_cycle_count_t cycles = FASTEST << registers[ODR];
+
+	return (registers[PWR_CTRL] & NORMAL) == NORMAL && US(conversion_us()) < cycles ? cycles : 0;
+}
+
+/* The low pass begins with the first sample [4.3.21]. */
+static uint32_t filtered(double *state, uint32_t raw)
+{
+	double coefficient = (1 << (registers[CONFIG] >> 1 & 7)) - 1;
+
+	*state = *state > 0.0 ? *state + (raw - *state) / (coefficient + 1.0) : raw;
+	return (uint32_t)lround(*state);
+}
+
 static avr_cycle_count_t sample(void *self)
 {
-	uint32_t raw_temperature = counts_at(celsius_of, input.row.temperature / 20.0, 0);
+	uint32_t raw = counts_at(celsius_of, input.row.temperature / 20.0, 0);
 
-	put24(DATA, counts_at(pascal_of, input.row.pressure / 4.0, celsius_of(raw_temperature, 0)));
-	put24(DATA + 3, raw_temperature);
-	registers[STATUS] |= PRESSURE_READY | TEMPERATURE_READY;
-	return FASTEST << registers[ODR];
+	raw = filtered(&low_pass[1], raw);
+	put24(DATA, filtered(&low_pass[0], counts_at(pascal_of, input.row.pressure / 4.0, celsius_of(raw, 0))));
+	put24(DATA + 3, raw);
+	if ((registers[PWR_CTRL] & BOTH) == BOTH)
+		registers[STATUS] |= PRESSURE_READY | TEMPERATURE_READY;
+	return period();
+}
+
+/* As Bosch's example bmp3_selftest.c computes it. */
+static uint8_t checksum(void)
+{
+	unsigned crc = 0xFF;
+
+	for (int k = 0; k < 8 * COEFFICIENTS_SIZE; k++) {
+		unsigned bit = (registers[COEFFICIENTS + k / 8] >> (7 - k % 8)) & 1;
+
+		crc = (crc << 1 ^ ((crc >> 7 & 1) != bit ? 0x1D : 0)) & 0xFF;
+	}
+	return (uint8_t)~crc;
 }
 
 static void power(void *self)
@@ -97,6 +145,8 @@ static void power(void *self)
 	for (int k = 0; k < PARAMETERS; k++)
 		for (int byte = 0; byte < parameters[k].size; byte++)
 			*c++ = (uint8_t)((unsigned)parameters[k].value >> 8 * byte);
+	registers[CHECKSUM] = checksum();
+	low_pass[0] = low_pass[1] = 0.0;
 	part_sample_after(self, 0);
 	chips->up_at = avr->cycle + START_UP;
 }
@@ -110,7 +160,7 @@ static int get(void *self, uint8_t at)
 		return 0;
 	if (at == CHIP_ID)
 		return fault == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
-	if (at >= COEFFICIENTS && at < COEFFICIENTS + 21 && fault == EMPTY)
+	if (at >= COEFFICIENTS && at < COEFFICIENTS + COEFFICIENTS_SIZE && fault == EMPTY)
 		return 0;
 	if (at == STATUS)
 		return fault == STUCK_READY ? value | PRESSURE_READY : fault == NEVER_READY ? value & ~PRESSURE_READY : value;
@@ -125,11 +175,11 @@ static void set(void *self, uint8_t at, uint8_t value)
 		return;
 	if (at == CMD && value == SOFT_RESET)
 		power(self);
-	if (at < IF_CONF || at >= COEFFICIENTS) /* read only */
+	if (at < IF_CONF || at >= CHECKSUM) /* read only */
 		return;
 	registers[at] = value;
-	if (at == PWR_CTRL && (value & NORMAL) == NORMAL)
-		part_sample_after(self, FASTEST << registers[ODR]);
+	if (at >= PWR_CTRL && at <= ODR)
+		part_sample_after(self, period());
 }
 
 static int exchange(void *self, uint8_t sent)

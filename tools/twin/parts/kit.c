@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * All chips, and which one is plugged in in each place: that of the papers, that of the kit of 2026, none, on a foot board, or a MaxSonar. A part
- * that is plugged in gets its power anew, and so do the others of its model. */
+ * All chips, and which one is plugged in in each place: that of the papers, that of the kit of 2026, none, on a foot
+ * board, or a MaxSonar. A part that is plugged in gets its power anew, and so do the others of its model. */
 #include <simavr/sim_cycle_timers.h>
 
 #include "parts/parts.h"

@@ -1,37 +1,49 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Three LSM6DSO on the chip selects of the ADIS16100 [LSM6DSO data sheet DS12140]: SPI mode 0 or 3, at most 10 MHz. Gyros of 1000 deg/s give
- * 0.035 deg/s per count, those of other ranges in proportion; accelerometers of 8 g 0.244 mg.
+ * Three LSM6DSO on the chip selects of the ADIS16100 [LSM6DSO data sheet DS12140]: SPI mode 0 or 3, at most 10 MHz.
+ * Gyros of 1000 deg/s give 0.035 deg/s per count, those of other ranges in proportion; accelerometers of 8 g 0.244 mg.
  *
- * The self-test changes the rate by 150 to 700 deg/s at 2000 deg/s and by 20 to 80 at 250 [page 10]; between them in proportion to the range.
+ * The self-test changes the rate by 150 to 700 deg/s at 2000 deg/s and by 20 to 80 at 250 [page 10]; between them in
+ * proportion to the range.
  *
- * A rate is ready 70 ms after the gyros are switched on, then at the output rate, here always 1.67 kHz: what is read is the row under way.
- * The axes are those that the extended rows have; a plain row has the rate about z only, and a part that lies still otherwise. */
+ * A rate is ready 70 ms after the gyros are switched on. Both sensors measure at their output rates; what is read is
+ * the row under way when the first STATUS after a measurement is read. The axes are those that the extended rows have;
+ * a plain row has the rate about z only, and a part that lies still otherwise. */
 #include <math.h>
 #include <string.h>
 
 #include "parts/parts.h"
 
-enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL5_C = 0x14, CTRL8_XL = 0x17, CTRL9_XL = 0x18, STATUS = 0x1E, OUT_TEMP = 0x20, OUT_G = 0x22, OUT_A = 0x28, REGISTERS = 0x80 };
-enum { RATE_READY = 2, FORCE_READY = 1 };
+enum { WHO_AM_I = 0x0F, CTRL1_XL, CTRL2_G, CTRL3_C, CTRL4_C, CTRL5_C, CTRL6_C, CTRL8_XL = 0x17, CTRL9_XL };
+enum { STATUS = 0x1E, RESERVED, OUT_TEMP, REGISTERS = 0x80 };
+enum { ADDRESSES_COUNT_UP = 4, THREE_WIRES = 8, GYROS_SLEEP = 0x40, LPF1 = 2, I3C_OFF = 2 };
+enum { RATES, FORCES, SENSORS };
+static const struct {
+	uint8_t control, out, ready; /* its control register, its first output, its bit of STATUS */
+} sensors[SENSORS] = { { CTRL2_G, 0x22, 2 }, { CTRL1_XL, 0x28, 1 } };
 enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, VIBRATING, I3C };
 #define IDENTITY 0x6C
 #define OTHER_IDENTITY 0x69 /* an LSM6DS3 */
 #define BOOT US(10000)
 #define GYROS_ON US(70000)
-#define FASTEST_READY US(600)
+#define SLOWEST_HERTZ 13.02 /* 1667 / 128 */
 #define FILTER_S 0.0032 /* 50 Hz */
 #define FULL_SCALE 32767
 #define VIBRATION_HERTZ 400.0
 #define VIBRATION_COUNTS 8196.0 /* 2 g */
+#define TREMBLE_COUNTS 1429.0 /* 50 deg/s, with the vibration */
+
+FAULT_SWITCH(imu_reserved, "<=255", NULL, 0) /* what register 0x1F reads, of which the data sheet says nothing */
 
 static struct imu {
 	struct register_file file;
 	uint8_t registers[REGISTERS];
-	avr_cycle_count_t rates_at, read_at;
+	avr_cycle_count_t on_at[SENSORS];
+	uint64_t measured[SENSORS]; /* number of the newest measurement since then */
+	uint8_t ready;              /* bits of STATUS */
 	double excited; /* counts of 0.035 deg/s added by the self-test at the time `excited_at` */
 	avr_cycle_count_t excited_at;
 	int response;
-	bool confused; /* by frames for others while the processor restarted, for I3C was on [STMicroelectronics/stm32-lsm6dso issue 1] */
+	bool confused; /* by frames for others, for I3C was on [STMicroelectronics/stm32-lsm6dso issue 1] */
 	struct axes kept; /* of a part that is stuck */
 } imus[3] = {
 	{ .file.spi = { .part = PART(lsm6dso, PLACE_THIGH, "imu_thigh"), .port = 'B', .pin = 4 } },
@@ -41,9 +53,22 @@ static struct imu {
 
 static double full_scale_dps(const struct imu *u)
 {
-	static const double by_code[4] = { 250.0, 500.0, 1000.0, 2000.0 };
+	return u->registers[CTRL2_G] & 2 ? 125.0 : ldexp(250.0, (u->registers[CTRL2_G] >> 2) & 3);
+}
 
-	return by_code[(u->registers[CTRL2_G] >> 2) & 3];
+static double full_scale_g(const struct imu *u)
+{
+	static const double by_code[4] = { 2.0, 16.0, 4.0, 8.0 };
+
+	return by_code[(u->registers[CTRL1_XL] >> 2) & 3];
+}
+
+static double hertz(const struct imu *u, int sensor)
+{
+	bool asleep = sensor == RATES && (u->registers[CTRL4_C] & GYROS_SLEEP);
+	int code = u->registers[sensors[sensor].control] >> 4;
+
+	return asleep || code == 0 ? 0.0 : ldexp(SLOWEST_HERTZ, code - 1);
 }
 
 /* Counts of 0.035 deg/s that the self-test adds in the end: ST_G 01 of positive, 11 of negative sign. */
@@ -61,16 +86,26 @@ static double excitation(const struct imu *u)
 	return target(u) + (u->excited - target(u)) * exp(-(double)(avr->cycle - u->excited_at) / 16e6 / FILTER_S);
 }
 
-/* A vibration above the rate at which the part is polled, behind the low pass of the accelerometers: half the output rate of 1667 Hz, or with LPF2
- * its share by HPCF_XL [chapter 9, CTRL1_XL and CTRL8_XL; half the output rate from memory]. */
-static double vibration(const struct imu *u)
+/* Low pass: of the accelerometers half the output rate, or with LPF2 its share by HPCF_XL; of the gyros LPF1 by FTYPE,
+ * at 1.67 kHz [chapter 9, CTRL1_XL and CTRL8_XL, CTRL6_C; half the output rate and the gyros' from memory]. */
+static double cut_hertz(const struct imu *u, int sensor)
 {
 	static const double shares[8] = { 4.0, 10.0, 20.0, 45.0, 100.0, 200.0, 400.0, 800.0 };
-	double cut = 1667.0 / (u->registers[CTRL1_XL] & 2 ? shares[u->registers[CTRL8_XL] >> 5] : 2.0), r = VIBRATION_HERTZ / cut;
+	static const double by_type[8] = { 274.0, 212.0, 150.0, 390.0, 93.0, 49.0, 24.6, 12.4 };
+
+	if (sensor == RATES)
+		return u->registers[CTRL4_C] & LPF1 ? by_type[u->registers[CTRL6_C] & 7] : hertz(u, sensor) / 2.0;
+	return hertz(u, sensor) / (u->registers[CTRL1_XL] & 2 ? shares[u->registers[CTRL8_XL] >> 5] : 2.0);
+}
+
+/* A vibration above the rate at which the part is polled, behind the low pass. */
+static double vibration(const struct imu *u, int sensor)
+{
+	double r = VIBRATION_HERTZ / cut_hertz(u, sensor), counts = sensor == RATES ? TREMBLE_COUNTS : VIBRATION_COUNTS;
 
 	if (u->file.part.fault.value != VIBRATING)
 		return 0.0;
-	return VIBRATION_COUNTS / sqrt(1.0 + r * r * r * r) * sin(6.283185307 * VIBRATION_HERTZ * (double)avr->cycle / 16e6);
+	return counts / sqrt(1.0 + r * r * r * r) * sin(6.283185307 * VIBRATION_HERTZ * (double)avr->cycle / 16e6);
 }
 
 static void put(struct imu *u, int at, double value)
@@ -81,25 +116,33 @@ static void put(struct imu *u, int at, double value)
 	u->registers[at + 1] = (uint8_t)((unsigned long)counts >> 8);
 }
 
-static void sample(struct imu *u)
+static void measure(struct imu *u, int sensor)
 {
 	unsigned fault = u->file.part.fault.value;
 	const struct axes *a = fault == STUCK ? &u->kept : &input.motion[u - imus];
 
 	put(u, OUT_TEMP, (input.row.temperature / 20.0 - 25.0) * 256.0);
 	for (int k = 0; k < 3; k++) {
-		double rate = fault == SATURATED ? 1e6 : (a->rate[k] + excitation(u)) * 1000.0 / full_scale_dps(u);
+		double rate = (a->rate[k] + excitation(u) + vibration(u, RATES)) * 1000.0 / full_scale_dps(u);
+		double force = (a->force[k] + vibration(u, FORCES)) * 8.0 / full_scale_g(u);
 
-		put(u, OUT_G + 2 * k, u->registers[CTRL2_G] ? rate : 0.0);
-		put(u, OUT_A + 2 * k, u->registers[CTRL1_XL] ? a->force[k] + vibration(u) : 0.0);
+		put(u, sensors[sensor].out + 2 * k, sensor == FORCES ? force : fault == SATURATED ? 1e6 : rate);
 	}
 }
 
-static uint8_t status(const struct imu *u)
+static uint8_t status(struct imu *u)
 {
-	bool rates = u->registers[CTRL2_G] >> 4 && avr->cycle >= u->rates_at && avr->cycle >= u->read_at + FASTEST_READY;
+	for (int k = 0; k < SENSORS; k++) {
+		bool on = hertz(u, k) > 0.0 && avr->cycle >= u->on_at[k];
+		uint64_t count = on ? 1 + (uint64_t)((double)(avr->cycle - u->on_at[k]) * hertz(u, k) / 16e6) : 0;
 
-	return u->file.part.fault.value == NEVER_READY ? 0 : (uint8_t)((rates ? RATE_READY : 0) | (u->registers[CTRL1_XL] >> 4 ? FORCE_READY : 0));
+		if (on && count != u->measured[k]) {
+			measure(u, k);
+			u->ready |= sensors[k].ready;
+		}
+		u->measured[k] = count;
+	}
+	return u->file.part.fault.value == NEVER_READY ? 0 : u->ready;
 }
 
 static int get(void *self, uint8_t at)
@@ -110,12 +153,13 @@ static int get(void *self, uint8_t at)
 		return 0;
 	if (at == WHO_AM_I)
 		return u->file.part.fault.value == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
-	if (at == STATUS) {
-		sample(u);
+	if (at == STATUS)
 		return status(u);
-	}
-	if (at == OUT_G + 5)
-		u->read_at = avr->cycle;
+	if (at == RESERVED)
+		return (int)imu_reserved.value;
+	for (int k = 0; k < SENSORS; k++)
+		if (at == sensors[k].out + 5)
+			u->ready &= (uint8_t)~sensors[k].ready;
 	return u->registers[at];
 }
 
@@ -125,13 +169,36 @@ static void set(void *self, uint8_t at, uint8_t value)
 
 	if (at == WHO_AM_I || at >= STATUS)
 		return;
-	if (at == CTRL2_G && !(u->registers[at] >> 4) && value >> 4)
-		u->rates_at = avr->cycle + GYROS_ON;
+	for (int k = 0; k < SENSORS; k++)
+		if (at == sensors[k].control && !(u->registers[at] >> 4) && value >> 4)
+			u->on_at[k] = avr->cycle + (k == RATES ? GYROS_ON : 0);
 	if (at == CTRL5_C || at == CTRL2_G) {
 		u->excited = excitation(u);
 		u->excited_at = avr->cycle;
 	}
 	u->registers[at] = value;
+	if (at == CTRL9_XL && (value & I3C_OFF))
+		u->confused = false;
+}
+
+/* Without counting addresses a frame is of one register. */
+static int exchange(void *self, uint8_t sent)
+{
+	struct imu *u = self;
+	uint8_t at = u->file.address;
+	bool first = u->file.count == 0;
+	int answer = registers_exchange(self, sent);
+
+	if (!first && !(u->registers[CTRL3_C] & ADDRESSES_COUNT_UP))
+		u->file.address = at;
+	return (u->registers[CTRL3_C] & THREE_WIRES) && u->file.part.fault.value != ZEROS ? SPI_OPEN : answer;
+}
+
+static void resume(void *self)
+{
+	struct imu *u = self;
+
+	u->confused = u->file.part.fault.value == I3C && !(u->registers[CTRL9_XL] & I3C_OFF);
 }
 
 static void power(void *self)
@@ -139,20 +206,15 @@ static void power(void *self)
 	struct imu *u = self;
 
 	memset(u->registers, 0, STATUS);
-	u->registers[CTRL3_C] = 0x04;
-	if (!u->response && part_is_plugged(self)) /* drawn when it is first plugged in: a board of the papers is the same with and without this model */
+	u->registers[CTRL3_C] = ADDRESSES_COUNT_UP;
+	u->registers[CTRL9_XL] = 0xE0;
+	/* drawn when it is first plugged in: a board of the papers is the same with and without this model */
+	if (!u->response && part_is_plugged(self))
 		u->response = 4600 + (int)random_below(15000); /* 161 to 686 deg/s */
 	u->file.up_at = avr->cycle + BOOT;
 	u->excited = 0.0;
-	u->confused = false;
-	u->read_at = 0;
-}
-
-static void resume(void *self)
-{
-	struct imu *u = self;
-
-	u->confused = u->file.part.fault.value == I3C && !(u->registers[CTRL9_XL] & 2);
+	u->ready = 0;
+	resume(self);
 }
 
 static void changed(void *self, unsigned before)
@@ -160,6 +222,7 @@ static void changed(void *self, unsigned before)
 	struct imu *u = self;
 
 	part_returned(self, before);
+	resume(self);
 	u->kept = input.motion[u - imus];
 }
 
@@ -171,7 +234,7 @@ const struct model lsm6dso = {
 	.resume = resume,
 	.changed = changed,
 	.select = registers_select,
-	.exchange = registers_exchange,
+	.exchange = exchange,
 	.get = get,
 	.set = set,
 	.zeros = ZEROS,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Two I2CXL-MaxSonar-EZ ultrasonic rangers on the I2C bus [MaxBotix PD11848].
  *
- * One byte starts a ranging, from 25 ms for near things to 67 ms. A read gives the last range in cm, high byte first; things that are nearer
- * than the least range are given as that. It stretches the clock. */
+ * One byte starts a ranging, from 25 ms for near things to 67 ms. A read gives the last range in cm, high byte first;
+ * things that are nearer than the least range are given as that. It stretches the clock. */
 #include "parts/parts.h"
 
 #define TAKE_RANGE 81
@@ -54,8 +54,11 @@ static void on_stop(void *self)
 	struct ranger *r = self;
 	uint32_t own_us = input.row.own_us[r - rangers], flight_us = own_us && own_us < WINDOW_US ? own_us : WINDOW_US;
 
-	if (r->count == 1 && r->written[0] == TAKE_RANGE)
-		ranger_ping(r, r->twi.part.fault.value == MUTE ? NEVER : avr->cycle + US(OVERHEAD_US + flight_us + random_below(SPREAD_US)));
+	if (r->count == 1 && r->written[0] == TAKE_RANGE) {
+		avr_cycle_count_t end = avr->cycle + US(OVERHEAD_US + flight_us + random_below(SPREAD_US));
+
+		ranger_ping(r, r->twi.part.fault.value == MUTE ? NEVER : end);
+	}
 	r->count = 0;
 }
 

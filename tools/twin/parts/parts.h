@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The chips around the processor: what all of them have (kit.c), those with registers (registers.c), and rangers (rangers.c). */
+ * The chips around the processor: what all of them have (kit.c), those with registers (registers.c), and rangers
+ * (rangers.c). */
 #ifndef ECHOSTEP_TWIN_PARTS_H
 #define ECHOSTEP_TWIN_PARTS_H
 
 #include "twin.h"
 
-enum place { PLACE_FOOT, PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_COMPASS, PLACE_THIGH, PLACE_CALF, PLACE_BELT, PLACE_PRESSURE, PLACES };
+enum place {
+	PLACE_FOOT, PLACE_RANGER_LEFT, PLACE_RANGER_RIGHT, PLACE_COMPASS, PLACE_THIGH, PLACE_CALF, PLACE_BELT,
+	PLACE_PRESSURE, PLACES,
+};
 enum kind { OF_PAPERS, OF_2026, MAXSONAR, OF_FOOT }; /* of a foot board, which has nothing in the other places */
 
 /* The faults that a model's list begins with; on I2C it has all of these. */
@@ -37,7 +41,8 @@ struct twi_device {
 	struct twi_device *next;
 };
 
-/* A file of registers: the first byte of a frame has the address, and the addresses of the bytes that follow count up. */
+/* A file of registers: the first byte of a frame has the address, and the addresses of the bytes that follow count
+ * up. */
 struct register_file {
 	union {
 		struct part part;
@@ -122,7 +127,8 @@ unsigned spi_mode(void);
 uint8_t spi_at_rising_edges(uint8_t out); /* what a part of modes 0 and 3 reads of a byte */
 int spi_answer(int answer);               /* what the processor reads of such a part's byte */
 bool spi_outruns(unsigned rise_ns);       /* half a bit is shorter than a level shifter's rise */
-bool spi_garbles(const char *chip, unsigned most_hertz, bool right_mode); /* all bits arrive one bit late; the trace names the cause */
+/* all bits arrive one bit late; the trace names the cause */
+bool spi_garbles(const char *chip, unsigned most_hertz, bool right_mode);
 void twi_add(struct twi_device *device);
 
 /* registers.c: the frames of SPI modes 0 and 3, and those of I2C */
@@ -135,8 +141,10 @@ uint8_t registers_read(void *self);
 /* rangers.c */
 enum { MUTE = OTHER_TWI_FAULTS, DEAF, MISREADS };
 extern const char *const sides[2];
-/* The first echo after `began` within the model's window, in us: of the own burst, or of the other ranger's; 0: none. */
-uint32_t bursts_first_echo(const struct model *model, const struct bursts *others, avr_cycle_count_t began, uint16_t own_us);
+/* The first echo after `began` within the model's window, in us: of the own burst, or of the other ranger's; 0:
+ * none. */
+uint32_t bursts_first_echo(const struct model *model, const struct bursts *others,
+                           avr_cycle_count_t began, uint16_t own_us);
 void bursts_add(const struct model *model, struct bursts *own, unsigned side, avr_cycle_count_t at); /* and traces it */
 void ranger_power(void *self);
 bool ranger_start(void *self, bool read);

@@ -1,15 +1,17 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
  * Two pulse rangers of the kind of RCWL-1601 and HC-SR04P [HC-SR04 user guide].
  *
- * A trigger of at least 10 us starts a burst; the echo line rises at its end and falls with the first echo, or after 38 ms without one.
- * Triggers are wired to PF5 and PF4, echo lines to PD4 and PC7 (left, right). The echo is of the own burst, or of the other ranger's. */
+ * A trigger of at least 50 us starts a burst; the echo line rises at its end and falls with the first echo, or after 38
+ * ms without one. Triggers are wired to PF5 and PF4, echo lines to PD4 and PC7 (left, right). The echo is of the own
+ * burst, or of the other ranger's. */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_cycle_timers.h>
 
 #include "parts/parts.h"
 
-#define TRIGGER_LEAST US(10)
-#define BURST_US 450u   /* from the end of the trigger to the rising edge, 8 cycles of 40 kHz and the module's own program */
+#define TRIGGER_LEAST US(50) /* of an RCWL-1655; most are content with 10 us */
+/* from the end of the trigger to the rising edge, 8 cycles of 40 kHz and the module's own program */
+#define BURST_US 450u
 #define SPREAD_US 30u   /* random part of it */
 #define NO_ECHO_US 38000u
 #define GLITCH US(3000)
@@ -18,7 +20,8 @@
 #define LOOK US(50)
 #define GHOST_US 467u /* 8 cm in the ping after one without an echo [forum.arduino.cc 429576, 337199] */
 
-/* NO_TIMEOUT: without an echo the line stays high until it is pulled low from outside [NewPing; HC-SR04P: fossasia/pslab-python 209]; ENDLESS: even then. */
+/* NO_TIMEOUT: without an echo the line stays high until it is pulled low from outside [NewPing; HC-SR04P:
+ * fossasia/pslab-python 209]; ENDLESS: even then. */
 enum { STUCK_LOW = OTHER_FAULTS, STUCK_HIGH, UNECHOED, HELD, LONG, NO_TIMEOUT, ENDLESS, GHOST };
 
 static struct pulse_ranger {
@@ -71,7 +74,8 @@ static avr_cycle_count_t wait_for_ever(avr_t *a, avr_cycle_count_t when, void *p
 	return r->part.fault.value == ENDLESS ? when + LOOK : 0;
 }
 
-/* A burst of the other ranger that begins while this one listens is not heard: a shortcut, it would arrive behind most own echoes. */
+/* A burst of the other ranger that begins while this one listens is not heard: a shortcut, it would arrive behind most
+ * own echoes. */
 static avr_cycle_count_t rise(avr_t *a, avr_cycle_count_t when, void *param)
 {
 	struct pulse_ranger *r = param;
@@ -108,7 +112,9 @@ static void trigger_changed(struct avr_irq_t *irq, uint32_t level, void *param)
 
 static void wire(void *self)
 {
-	avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), self == rangers ? 5 : 4), trigger_changed, self);
+	avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), self == rangers ? 5 : 4);
+
+	avr_irq_register_notify(pin, trigger_changed, self);
 }
 
 /* A ping under way is over. */

@@ -1,17 +1,20 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * What rangers have in common. Those on I2C do not acknowledge their address while they range; the result is the first echo in the model's window,
- * of the own burst or of the other ranger's. */
+ * What rangers have in common. Those on I2C do not acknowledge their address while they range; the result is the first
+ * echo in the model's window, of the own burst or of the other ranger's. */
 #include "parts/parts.h"
 
 const char *const sides[2] = { "left", "right" };
 
 void bursts_add(const struct model *model, struct bursts *own, unsigned side, avr_cycle_count_t at)
 {
-	own->last[own->count++ % 4] = (struct burst){ at, input.row.cross_us[!side], model->fades_us ? model->fades_us() : 0 };
+	uint32_t late_us = model->fades_us ? model->fades_us() : 0;
+
+	own->last[own->count++ % 4] = (struct burst){ at, input.row.cross_us[!side], late_us };
 	bench_trace("trigger %s", sides[side]);
 }
 
-uint32_t bursts_first_echo(const struct model *model, const struct bursts *others, avr_cycle_count_t began, uint16_t own_us)
+uint32_t bursts_first_echo(const struct model *model, const struct bursts *others,
+                           avr_cycle_count_t began, uint16_t own_us)
 {
 	int64_t least = model->least_us, none = (int64_t)(model->listens_us ? model->listens_us() : model->window_us) + 1;
 	int64_t first = own_us >= least && own_us < none ? own_us : none;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Chips with a file of registers. On SPI, in mode 0 or 3, the first byte of a frame has the address and the bit 0x80 of a read; on I2C the first
- * byte of a write has the address. */
+ * Chips with a file of registers. On SPI, in mode 0 or 3, the first byte of a frame has the address and the bit 0x80 of
+ * a read; on I2C the first byte of a write has the address. */
 #include "parts/parts.h"
 
 #define READ 0x80

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * SCP1000-D01 barometer on SPI [SCP1000 product family specification]: mode 0, at most 500 kHz, frames of address << 2 | write << 1.
+ * SCP1000-D01 barometer on SPI [SCP1000 product family specification]: mode 0, at most 500 kHz, frames of address << 2
+ * | write << 1.
  *
- * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and falls when
- * DATARD16 is read. Writing 1 to RSTR restarts it. DRDY is wired to PE6. */
+ * After power-up it is busy for 60 ms; OPERATION 0x09 measures at 9 Hz, 0x0A at 1.8 Hz; DRDY rises with each sample and
+ * falls when DATARD16 is read. Writing 1 to RSTR restarts it. DRDY is wired to PE6. */
 #include "parts/parts.h"
 
 enum { NO_EEPROM = OTHER_FAULTS, NO_START, DRDY_STUCK, DRDY_LOW, ZEROS };

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * Two SRF02 ultrasonic rangers on the I2C bus [SRF02 technical specification]: ranging takes 61 to 62 ms, or what the fault `srf_cycle`
- * says: "up to 65 mS" [there], "nearer the 60ms mark, but 70ms is a better value" [robot-electronics.co.uk forum, t=269]. */
+ * Two SRF02 ultrasonic rangers on the I2C bus [SRF02 technical specification]: ranging takes 61 to 62 ms, or what the
+ * fault `srf_cycle` says: "up to 65 mS" [there], "nearer the 60ms mark, but 70ms is a better value"
+ * [robot-electronics.co.uk forum, t=269]. */
 #include "parts/parts.h"
 
 enum { COMMAND, RANGE_HIGH = 2, RANGE_LOW, MINIMUM_HIGH, MINIMUM_LOW, REGISTERS };
@@ -12,7 +13,8 @@ FAULT_SWITCH(srf_cycle, "<=90000", NULL, 61000) /* us */
 
 #define FADING_FIRST_US 36000u /* a hall fades for 60 to 70 ms [robot-electronics.co.uk forum, t=68] */
 #define FADING_SPREAD_US 26000u
-FAULT_SWITCH(srf_window, "<=65000", NULL, 35000) /* us: how long it listens, 6 m as sold; "near the 60ms mark" [there] */
+/* us: how long it listens, 6 m as sold; "near the 60ms mark" [there] */
+FAULT_SWITCH(srf_window, "<=65000", NULL, 35000)
 FAULT_SWITCH(fading, "<=100", NULL, 0) /* % of the bursts whose last reverberation the other ranger hears */
 
 static struct ranger rangers[] = {
@@ -30,7 +32,8 @@ static bool on_start(void *self, bool read)
 static uint8_t on_read(void *self)
 {
 	struct ranger *r = self;
-	const uint8_t registers[REGISTERS] = { REVISION, UNUSED, (uint8_t)(r->result_us >> 8), (uint8_t)r->result_us, 0, 15 };
+	uint8_t high = (uint8_t)(r->result_us >> 8), low = (uint8_t)r->result_us;
+	const uint8_t registers[REGISTERS] = { REVISION, UNUSED, high, low, 0, 15 };
 
 	return registers[r->pointer++ % REGISTERS];
 }

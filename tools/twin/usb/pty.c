@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The board's port as a pseudo terminal that pyserial can open. DTR is on while a program has it open. Unplugging removes the terminal. */
+ * The board's port as a pseudo terminal that pyserial can open. DTR is on while a program has it open. Unplugging
+ * removes the terminal. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>

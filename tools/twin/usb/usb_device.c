@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: its registers; the cable's side is in usb_transactions.c.
+ * USB device controller of the ATmega32U4 [data sheet, chapters 21 and 22]: its registers; the cable's side is in
+ * usb_transactions.c.
  *
- * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after every interrupt. */
+ * Endpoints with two banks. Interrupts depend on levels, as in the chip: they are computed on every access and after
+ * every interrupt. */
 #include <string.h>
 
+#include <simavr/sim_cycle_timers.h>
 #include <simavr/sim_interrupts.h>
 
 #include "usb/usb_endpoints.h"
@@ -13,7 +16,9 @@
 
 struct endpoint usb_endpoints[ENDPOINTS];
 static bool suspended; /* the bus is idle */
-FAULT_SWITCH(suspend_repeats, "off on", NULL, 0) /* while the bus is idle the flag comes back at once: unknown of the silicon */
+FAULT_SWITCH(late_reset, "off on", NULL, 0)
+/* while the bus is idle the flag comes back at once: unknown of the silicon */
+FAULT_SWITCH(suspend_repeats, "off on", NULL, 0)
 
 static struct endpoint *selected(void) { return &usb_endpoints[avr->data[UENUM] < ENDPOINTS ? avr->data[UENUM] : 0]; }
 static struct bank *bank_of_cpu(struct endpoint *e) { return &e->bank[is_control(e) ? 0 : e->cpu]; }
@@ -64,12 +69,28 @@ void usb_offer_bank(struct endpoint *e)
 		e->flags |= RXOUTI | FIFOCON;
 }
 
+static avr_cycle_count_t reset_late(avr_t *a, avr_cycle_count_t when, void *param)
+{
+	late_reset.value = 0;
+	usb_host_reset();
+	return 0;
+}
+
+/* With the fault `late_reset` a suspended bus is reset right after the program has looked. */
+static uint8_t look_at_bus(void)
+{
+	if (late_reset.value && (avr->data[UDINT] & USB_SUSPEND))
+		avr_cycle_timer_register(avr, 1, reset_late, NULL);
+	return avr->data[UDINT];
+}
+
 static uint8_t read_register(avr_t *a, avr_io_addr_t address, void *param)
 {
 	struct endpoint *e = selected();
 	struct bank *b = bank_of_cpu(e);
 
 	switch (address) {
+	case UDINT: return look_at_bus();
 	case UEINTX: return interrupts_of(e);
 	case UECONX: return (uint8_t)((e->conx & EPEN) | (e->stalled ? STALLRQ : 0));
 	case UECFG0X: return e->cfg0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The endpoints of the device controller: what its registers (usb_device.c) and its transactions (usb_transactions.c) share. */
+ * The endpoints of the device controller: what its registers (usb_device.c) and its transactions (usb_transactions.c)
+ * share. */
 #ifndef ECHOSTEP_TWIN_USB_ENDPOINTS_H
 #define ECHOSTEP_TWIN_USB_ENDPOINTS_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every millisecond. The
- * requests are those of a Linux host with its cdc_acm driver, or those of Windows or macOS. */
+ * The USB host: waits for a device, resets and enumerates it, configures the CDC-ACM port, then moves bulk data every
+ * millisecond. The requests are those of a Linux host with its cdc_acm driver, or those of Windows or macOS. */
 #include <string.h>
 
 #include <simavr/sim_cycle_timers.h>
@@ -20,7 +20,8 @@
 
 /* The begin of requests [USB 2.0, 9.4; CDC 1.2], and types of descriptors. */
 enum { TO_DEVICE = 0x00, TO_INTERFACE = 0x01, CLASS = 0x21, FROM_DEVICE = 0x80 };
-enum { SET_ADDRESS = 5, GET_DESCRIPTOR, SET_CONFIGURATION = 9, SET_INTERFACE = 11, SET_LINE_CODING = 0x20, SET_CONTROL_LINE_STATE = 0x22 };
+enum { SET_ADDRESS = 5, GET_DESCRIPTOR, SET_CONFIGURATION = 9, SET_INTERFACE = 11 };
+enum { SET_LINE_CODING = 0x20, SET_CONTROL_LINE_STATE = 0x22 };
 enum { DEVICE = 1, CONFIGURATION, STRING, ENDPOINT = 5 };
 
 enum stage { SETUP, DATA_IN, DATA_OUT, STATUS_IN, STATUS_OUT };
@@ -106,7 +107,8 @@ static void finish_request(void)
 	requesting = false;
 	if (request[0] == TO_DEVICE && request[1] == SET_ADDRESS)
 		usb_target(request[2]);
-	if ((request[0] == TO_DEVICE && request[1] == SET_CONFIGURATION) || (request[0] == TO_INTERFACE && request[1] == SET_INTERFACE))
+	if ((request[0] == TO_DEVICE && request[1] == SET_CONFIGURATION) ||
+	    (request[0] == TO_INTERFACE && request[1] == SET_INTERFACE))
 		usb_reset_toggles();
 	if (request[0] == FROM_DEVICE && request[1] == GET_DESCRIPTOR)
 		take_descriptor();
@@ -229,6 +231,14 @@ static void next_step(void)
 	}
 }
 
+void usb_host_reset(void)
+{
+	reset_bus();
+	go(ENUMERATING);
+	step = 0;
+	control_size = usb_system_step(0)[6]; /* before the device has named it: Windows reads 64 bytes at once */
+}
+
 /* Once a millisecond: follows attach and detach, and gives up requests without an answer. */
 static void watch(void)
 {
@@ -237,10 +247,7 @@ static void watch(void)
 	} else if (state == DETACHED) {
 		go(DEBOUNCING);
 	} else if (state == DEBOUNCING && ++waited_ms >= DEBOUNCE_MS + usb_hub_debounce_ms()) {
-		reset_bus();
-		go(ENUMERATING);
-		step = 0;
-		control_size = usb_system_step(0)[6]; /* before the device has named it: Windows reads 64 bytes at once */
+		usb_host_reset();
 	}
 	if (waited_ms == IDLE_MS && (state == DEBOUNCING || state == SUSPENDED))
 		usb_bus_event(USB_SUSPEND, 0);
@@ -314,7 +321,9 @@ static void act(void *self, unsigned before)
 		go(state == DETACHED ? DETACHED : DEBOUNCING);
 		break;
 	case CONFIGURE:
-	case INTERFACE: /* some hosts choose the setting of an interface that has only one; it too resets the data toggles [USB 2.0, 9.1.1.5] */
+	/* some hosts choose the setting of an interface that has only one; it too resets the data toggles [USB 2.0,
+	 * 9.1.1.5] */
+	case INTERFACE:
 		if (idle)
 			begin_request(action == INTERFACE ? data_interface : configuration_1);
 		break;

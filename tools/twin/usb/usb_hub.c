@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * A high-speed hub between host and board [USB 2.0, chapter 11]: its transaction translator hands on in one frame what it has received in the
- * frame before, its bandwidth is shared with other devices, and the port is debounced for 100 ms [7.1.7.3]. */
+ * A high-speed hub between host and board [USB 2.0, chapter 11]: its transaction translator hands on in one frame what
+ * it has received in the frame before, its bandwidth is shared with other devices, and the port is debounced for 100 ms
+ * [7.1.7.3]. */
 #include <string.h>
 
 #include "twin.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later
- * The cable: transactions between the host and the endpoints [USB 2.0, chapter 8; ATmega32U4 data sheet, chapter 22], with the data toggles of both
- * ends, and packets that are damaged on the way. A damaged packet is as if it had not been sent: its checksum is wrong. */
+ * The cable: transactions between the host and the endpoints [USB 2.0, chapter 8; ATmega32U4 data sheet, chapter 22],
+ * with the data toggles of both ends, and packets that are damaged on the way. A damaged packet is as if it had not
+ * been sent: its checksum is wrong. */
 #include <string.h>
 
 #include "usb/usb_endpoints.h"
@@ -32,8 +33,9 @@ static struct endpoint *enabled_endpoint(uint8_t number)
 {
 	uint8_t own = avr->data[UDADDR] & ADDEN ? avr->data[UDADDR] & 0x7F : 0;
 	struct endpoint *e = &usb_endpoints[number];
+	bool is_mine = own == target && usb_device_attached() && number < ENDPOINTS;
 
-	return own == target && usb_device_attached() && number < ENDPOINTS && (e->conx & EPEN) && (e->cfg1 & ALLOC) ? e : NULL;
+	return is_mine && (e->conx & EPEN) && (e->cfg1 & ALLOC) ? e : NULL;
 }
 
 /* An answer without data, and what the endpoint notes of it. */

@@ -198,9 +198,7 @@ def _read_all(pipe: IO[bytes], portions: SimpleQueue[bytes]) -> None:
 def _error_line(output: str) -> str:
     """The first line of avrdude's output that names an error, with the lines that continue it, else the last line."""
     joined = re.sub(r"\n[ \t]+", " ", output.replace("\r\n", "\n"))
-    lines = [
-        line.strip() for line in joined.splitlines() if line.strip() and "Thank you" not in line and "#" not in line
-    ]
+    lines = [x.strip() for x in joined.splitlines() if x.strip() and "Thank you" not in x and "#" not in x]
     telling = [line for line in lines if re.search("error|not responding|mismatch|cannot|can't|fail", line, re.I)]
     return (telling or lines or ["it printed nothing"])[0 if telling else -1].removeprefix("avrdude: ")
 
@@ -210,7 +208,8 @@ def _confirm(port: str) -> str:
     back = wait_for(lambda: port if Path(port).exists() else find(list_seen(), Role.BOARD, BOARD_NAME), RESTART_S)
     if back is None:
         raise EchostepError(
-            f"written and verified, but the board did not come back in {RESTART_S:.0f} s: unplug it and plug it in again"
+            f"written and verified, but the board did not come back in {RESTART_S:.0f} s: unplug it and plug it in again; "
+            "one of 3.3 V and 8 MHz never does: use a board of 5 V and 16 MHz"
         )
     if said := wait_for(lambda: _answer(back), RESTART_S):
         return said

@@ -10,12 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats, Ints
+from echostep.arrays import Bools, Floats, Ints
 from echostep.board.calibration import ImuSettings, foot_axes
 from echostep.board.frames import BoardReader
 from echostep.board.messages import BoardHealth, Configuration, Foot, FootHealth, Identity, Parts, Status
 from echostep.board.reports import BoardReports
 
+MOST_M_S2 = 294.3  # 30 g, the part's range
+MOST_STEP = np.repeat([28.0, 125.0], 3)  # rad/s, m/s2 from sample to sample behind its low passes; assumed
 _REPORTS = (Identity, Configuration, Status, BoardHealth, Parts, FootHealth)
 
 
@@ -36,13 +38,14 @@ class FootBoardReader:
         self._errors = errors or ImuSettings()
         self.reader = BoardReader()
         self.reports = BoardReports()
-        self.samples = 0
+        self.samples = self.spikes = 0  # believed, and not
+        self._newest = self._believed = np.empty((0, 6))  # at most one row: sample, believed sample
 
     @property
     def lost(self) -> int:
-        """Frames that never came, and samples that the board could not read in time."""
+        """Frames that never came, samples that the board could not read in time, and such as no foot can have."""
         health = self.reports.foot
-        return self.reader.counts.lost + (0 if health is None else health.missed)
+        return self.reader.counts.lost + self.spikes + (0 if health is None else health.missed)
 
     def feed(self, received: bytes) -> FootFrames:
         """Samples completed by these bytes; raises StaleFirmwareError when the board has another schema."""
@@ -50,11 +53,24 @@ class FootBoardReader:
         for report in frames.each(_REPORTS):
             self.reports.add(report)
         frame_row, samples = frames.rows(Foot)
-        self.samples += len(samples)
-        rates, forces = foot_axes(samples)
+        values = np.hstack(foot_axes(samples))
+        good = self._good(values)
+        self.samples += int(np.sum(good))
         return FootFrames(
-            samples["ticks"].astype(np.int64),
-            self._errors.true_forces(forces),
-            self._errors.true_rates(rates),
-            frames.end[frame_row],
+            samples["ticks"][good].astype(np.int64),
+            self._errors.true_forces(values[good, 3:]),
+            self._errors.true_rates(values[good, :3]),
+            frames.end[frame_row[good]],
         )
+
+    def _good(self, values: Floats) -> Bools:
+        """Whether each sample (n, 6), rates and forces, is within the range, and near the one before or the last believed one: wrong bits are not."""
+        good: Bools = np.abs(values[:, 3:]).max(axis=1, initial=0.0) <= MOST_M_S2
+        steps = np.abs(np.diff(values, axis=0, prepend=self._newest if len(self._newest) else values[:1]))
+        for k in ((steps > MOST_STEP).any(axis=1) & good).nonzero()[0]:
+            believed = np.concatenate([self._believed, values[:k][good[:k]]])[-1:]
+            good[k] = (np.abs(values[k] - believed) <= MOST_STEP).all()
+        self._newest = np.concatenate([self._newest, values])[-1:]
+        self._believed = np.concatenate([self._believed, values[good]])[-1:]
+        self.spikes += int(np.sum(~good))
+        return good

@@ -98,8 +98,7 @@ def crc(identifier: int, plain: bytes) -> int:
 def encode(message: Message, sequence: int) -> bytes:
     """One frame with its closing zero; the sequence wraps at 65536."""
     plain = _HEAD_FORMAT.pack(message.id, sequence & 0xFFFF) + message.pack()
-    payload = plain + crc(message.id, plain).to_bytes(2, "little")
-    return bytes(cobs.encode(payload)) + b"\0"
+    return bytes(cobs.encode(plain + crc(message.id, plain).to_bytes(2, "little"))) + b"\0"
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,8 +87,7 @@ class Gateway:
             return []
         frame_index, rows = frames.rows(Beacon)
         self._counts.foreign += len(frames.id) - len(frame_index)
-        readings = (self._reading(Beacon._make(row.tolist()), now_s) for row in rows)
-        return [reading for reading in readings if reading is not None]
+        return [read for row in rows if (read := self._reading(Beacon._make(row.tolist()), now_s)) is not None]
 
     def _reading(self, beacon: Beacon, now_s: float) -> BeaconReading | None:
         """The reading of a message; None, and counted, if a check fails."""

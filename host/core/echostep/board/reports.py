@@ -13,6 +13,10 @@ from echostep.board.messages import Reports
 
 OPTIONAL = Reports.BOARD_HEALTH | Reports.PARTS | Reports.MOTION | Reports.MAGNETIC | Reports.FOOT
 SUBSCRIBE = messages.Subscribe(OPTIONAL)  # what a run asks a board for
+_NEWEST: dict[type[messages.Message], str] = {  # of which the newest one is kept
+    messages.Identity: "identity", messages.Configuration: "configuration", messages.BoardHealth: "board_health",
+    messages.Parts: "parts", messages.Electrical: "electrical", messages.Loop: "loop",
+}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -34,21 +38,12 @@ class BoardReports:
 
     def add(self, message: messages.Message) -> None:
         """Keep a message if it is a report; after a restart of the board there is no previous status."""
-        if isinstance(message, messages.Identity):
-            self.identity = message
-        elif isinstance(message, messages.Configuration):
-            self.configuration = message
-        elif isinstance(message, messages.BoardHealth):
-            self.board_health = message
+        if name := _NEWEST.get(type(message)):
+            setattr(self, name, message)
+        if isinstance(message, messages.BoardHealth):
             self.usual_supply_mv = max(self.usual_supply_mv, message.supply_mv)
-        elif isinstance(message, messages.Parts):
-            self.parts = message
         elif isinstance(message, messages.FootHealth):
             self.previous_foot, self.foot = self.foot, message
-        elif isinstance(message, messages.Electrical):
-            self.electrical = message
-        elif isinstance(message, messages.Loop):
-            self.loop = message
         elif isinstance(message, messages.GyroHealth):
             self.gyros[message.gyro] = message
         elif isinstance(message, messages.Status):

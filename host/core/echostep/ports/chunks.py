@@ -91,12 +91,9 @@ class Portion:
 
     def rows(self, begin: int, end: int) -> Portion:
         """The chunks from row `begin` up to row `end`."""
-        part = slice(begin, end)
-        return Portion(
-            self.ports, self.port[part], self.t_arrival_ns[part], self.start[part], self.end[part], self.received
-        )
+        return self.where(slice(begin, end))
 
-    def where(self, kept: Bools) -> Portion:
+    def where(self, kept: Bools | slice) -> Portion:
         """The chunks of those rows (n,) that are kept."""
         return Portion(
             self.ports, self.port[kept], self.t_arrival_ns[kept], self.start[kept], self.end[kept], self.received

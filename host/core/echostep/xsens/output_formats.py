@@ -87,9 +87,9 @@ class OutputFormats:
             return _first(self.mode, self.settings, rows, GIVEN)
         told_mode, told_settings = self._told.get(bus, (None, None))
         configured = None if told_mode is None else _first(told_mode, told_settings, rows, CONFIGURED)
-        if configured is None and told_mode is not None and told_settings is not None:
-            if _known(told_mode, told_settings) is None:
-                return None
+        is_told = configured is None and told_mode is not None and told_settings is not None
+        if is_told and _known(told_mode or 0, told_settings or 0) is None:
+            return None
         return configured or _first(None, None, rows, BY_LENGTH)
 
 

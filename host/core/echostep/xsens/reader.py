@@ -169,15 +169,9 @@ class MtxReader:
         values, counter, _, _, end = messages if passed.all() else messages.at(np.flatnonzero(passed))
         fresh = self._fresh(values)
         values, counter, end = (values, counter, end) if fresh.all() else (values[fresh], counter[fresh], end[fresh])
-        return MtBatch(
-            counter,
-            values[:, mt.ACCEL],
-            values[:, mt.GYRO],
-            values[:, mt.MAG],
-            values[:, mt.ATTITUDE],
-            values[:, mt.CELSIUS],
-            end,
-        )
+        groups = (mt.ACCEL, mt.GYRO, mt.MAG, mt.ATTITUDE, mt.CELSIUS)
+        accel, gyro, mag, attitude, celsius = (values[:, group] for group in groups)
+        return MtBatch(counter, accel, gyro, mag, attitude, celsius, end)
 
     def _fresh(self, values: Floats) -> Bools:
         """Whether each sample (n,) is one: a sensor has noise, so one that gives equal values for longer than HELD samples has stopped."""

@@ -41,6 +41,7 @@ from echostep_app.board.faults.part_faults import (
     SIX_AXES_RESPONSES,
     SIX_AXES_TESTS,
     UNKNOWN_PART_REMEDIES,
+    WRONG_BITS_REMEDY,
     foot_text,
     mixed_rangers,
     part_text,
@@ -52,7 +53,6 @@ UNMOVED_COUNTS = 12  # largest response to a self-test that is taken for none; a
 CELSIUS_AT_ZERO, CELSIUS_PER_COUNT = 25.0, 0.1453  # 8.4 mV per degC [ADXRS300], counts of 5 V / 4096
 PROPER_RESPONSES = "-121 to -376 and 121 to 376"  # counts, to ST1 and ST2
 
-WRONG_BITS_REMEDY = "shorten its SPI wires, and put 100 ohm in series into SCK and MOSI at the board"
 _POWER_CYCLE = "power-cycle the board, check 3.3 V and the level shifter"
 _PRESSURE_TEXTS = {
     Fault.NO_ANSWER: (
@@ -221,14 +221,8 @@ def foot_findings(reports: BoardReports) -> list[Finding]:
     more = 0 if before is None else (foot.errors - before.errors) & 0xFFFF
     if foot.fault != Fault.BAD_VALUE or not more:
         return []
-    return [
-        Finding(
-            Severity.WARNING,
-            subject,
-            f"sent wrong bits {more} time{'s' if more > 1 else ''} in the last second",
-            WRONG_BITS_REMEDY,
-        )
-    ]
+    what = f"sent wrong bits {more} time{'s' if more > 1 else ''} in the last second"
+    return [Finding(Severity.WARNING, subject, what, WRONG_BITS_REMEDY)]
 
 
 def foot_celsius(counts: int) -> float:

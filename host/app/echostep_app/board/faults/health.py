@@ -25,7 +25,6 @@ from echostep.board.messages import (
 )
 from echostep.board.reports import BoardReports
 from echostep_app.board.faults.device_faults import (
-    WRONG_BITS_REMEDY,
     device_findings,
     foot_findings,
     gyro_celsius,
@@ -45,7 +44,7 @@ from echostep_app.board.faults.findings import (
     span_s,
     status_field,
 )
-from echostep_app.board.faults.part_faults import part_text
+from echostep_app.board.faults.part_faults import I2C_BITS_REMEDY, WRONG_BITS_REMEDY, part_text
 
 LEAST_MV = 4100  # a measurement below it is below the 4.5 V that 16 MHz need, although the reference is off by up to 9 % [data sheet]
 SAG = 0.08  # of the usual voltage: 0.4 V, more than the drop on a good cable
@@ -143,9 +142,9 @@ def _intermittent_findings(reports: BoardReports) -> list[Finding]:
             fault, span = Fault(status_field(status, "fault", device)), f"in the last {span_s(status, previous):.0f} s"
             what = f"failed {count} times {span} ({fault.name.lower().replace('_', ' ')}), and answers again"
             remedy = "a loose plug is likely: move the cable and watch"
-            if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) is Part.BMP390):
+            if fault is Fault.BAD_VALUE and (device & GYROS or part_in(reports, device) in (Part.BMP390, Part.LIS3MDL)):
                 what = f"sent wrong bits {count} time{'s' if count > 1 else ''} {span}"
-                remedy = WRONG_BITS_REMEDY
+                remedy = I2C_BITS_REMEDY if device is Healthy.COMPASS else WRONG_BITS_REMEDY
             if fault is Fault.TOO_LATE and part_in(reports, device) is Part.PULSE:
                 what, remedy = part_text(Part.PULSE, 0, device, fault) or (what, remedy)
             findings.append(Finding(Severity.WARNING, name_of(reports, device), what, remedy))

@@ -9,11 +9,13 @@ from __future__ import annotations
 from echostep.board.messages import Fault, Healthy, Part, SelfTest
 
 _SPI = "check its plug, its 5 V and ground, and the SPI wires"
+I2C_BITS_REMEDY = "shorten its cable, check the pull-ups, SDA (D2) and SCL (D3)"
+WRONG_BITS_REMEDY = "shorten its SPI wires, and put 100 ohm in series into SCK and MOSI at the board"
 _AGAIN = "power-cycle the board; if it stays, replace the part"
 
 _BMP390 = {
     Fault.NO_ANSWER: ("does not answer", f"{_SPI}; its chip select is D6"),
-    Fault.EEPROM: ("its calibration is empty", _AGAIN),
+    Fault.EEPROM: ("its calibration reads with a wrong check sum", f"{_SPI}; {_AGAIN}"),
     Fault.NEVER_READY: ("has had no sample for 2 s", f"it may have lost its supply for a moment: {_SPI}"),
     Fault.ALWAYS_READY: ("reports a sample that it cannot have yet", f"its data line may be held high: {_SPI}"),
     Fault.BAD_VALUE: ("gives pressures outside of 300 to 1250 hPa", _AGAIN),
@@ -42,6 +44,7 @@ _MAXSONAR = {
 _LSM6DSO = {
     Fault.NO_ANSWER: ("does not answer", f"{_SPI} and its chip select (thigh D8, calf D9, belt D10)"),
     Fault.NEVER_READY: ("has no new rates", f"it may have lost its supply for a moment: {_SPI}"),
+    Fault.BAD_VALUE: ("sent wrong bits", WRONG_BITS_REMEDY),
 }
 _LIS3MDL = {
     Fault.NO_ANSWER: ("does not answer at I2C address 0x1C or 0x1E", "check its plug and 5 V, SDA (D2) and SCL (D3)"),

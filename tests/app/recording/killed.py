@@ -1,40 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Kills a recording process with SIGKILL at random moments, and measures what is missing from its file.
+"""A recording process that is killed with SIGKILL, and what is missing from its file.
 
-In: options. Out: how many milliseconds before each kill are missing; exit status 1 when it is more than a second, when a file does not open, or
-when a recording of an earlier run is not the same bytes as before. Owns the processes that it starts.
-
-All runs record under one name in one folder, as `echostep live` does.
-
-The killed process records 850 chunks a second, as the ports deliver them, and holds the interpreter lock for long moments, as the filter's
-kernels do. It writes number and time of each recorded chunk to a pipe, which outlives it. A chunk that is in the pipe but not in the file
-is lost.
+It records 850 chunks a second, as the ports deliver them, and holds the interpreter lock for long moments, as the filter's kernels do. It writes
+number and time of each recorded chunk to a pipe, which outlives it. A chunk that is in the pipe but not in the file is lost.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import random
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from echostep.errors import EchostepError
 from echostep.recording import MCAP_MAGIC, open_recording
 from echostep_app.recording.repair.edit import repair
-from places import OUT
-from reliability.campaign import CampaignJournal, Figure, none, options, report
 
 CHUNK_NS = 1_200_000  # between two chunks: 850 a second, as both ports deliver them
 ROW = struct.Struct("<Qq")
-LIMIT_MS = 1000.0
 
 WRITER = """
 import os, struct, sys, time
@@ -61,10 +49,8 @@ with start_recording(Path(path), {"note": "to be killed"}) as recorder:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """Loss of one kill: chunks given to the recorder, chunks missing, the time before the kill that they span; earlier recordings that changed."""
+    """Loss of one kill: the time before it that is missing, and earlier recordings that changed."""
 
-    given: int
-    missing: int
     missing_s: float
     opens: bool
     changed: int
@@ -110,37 +96,4 @@ def _loss(path: Path, given: Sequence[tuple[int, int]], changed: int) -> Kill:
     assert numbers == list(range(1, len(numbers) + 1)), "chunks are missing in the middle"
     lost = [t_ns for number, t_ns in given if number > len(numbers)]
     missing_s = (given[-1][1] - lost[0]) * 1e-9 + CHUNK_NS * 1e-9 if lost else 0.0
-    return Kill(len(given) - 1, len(lost), missing_s, opens, changed)
-
-
-def main() -> int:
-    """Run the kills and print the losses."""
-    asked = options(
-        __doc__,
-        out=(OUT / "kills.jsonl", "losses so far; they are not measured again"),
-        kills=(200, "how many"),
-        longest=(3.0, "latest moment of a kill, s"),
-        seed=(1, "of the moments"),
-    )
-    rng = random.Random(asked.seed)
-    with tempfile.TemporaryDirectory() as folder:
-        wanted, moments_s = Path(folder) / "walk.mcap", [rng.uniform(0.05, asked.longest) for _ in range(asked.kills)]
-        runs = {
-            f"{k}, after {after_s:.3f} s": partial(kill_once, wanted, after_s) for k, after_s in enumerate(moments_s)
-        }
-        kills = CampaignJournal(asked.out).play("kill -9", runs)
-    missing_ms = sorted(1e3 * kill["missing_s"] for kill in kills)
-    return report(
-        f"{len(kills)} kills",
-        [
-            Figure("missing at the end, median", f"{missing_ms[len(kills) // 2]:.0f} ms"),
-            Figure("missing at worst", f"{missing_ms[-1]:.0f} ms", f"<= {LIMIT_MS:.0f} ms", missing_ms[-1] <= LIMIT_MS),
-            *(Figure(f"chunks {what}", f"{sum(kill[what] for kill in kills):,}") for what in ("given", "missing")),
-            none("files that do not open", sum(not kill["opens"] for kill in kills)),
-            none("earlier recordings that changed", sum(kill["changed"] for kill in kills)),
-        ],
-    )
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return Kill(missing_s, opens, changed)
