@@ -17,7 +17,7 @@ from dataclasses import replace
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
-# Assumed, not measured. Rates (1/s) at which such a way begins: with a witness; in a silence that the stand began with; where it fell silent
+# Assumed, not measured. Rates (1/s) at which such a way begins: with a witness; in a silence that the stand began with; where rangers fell silent
 BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FASTEST_M_S = 10.0  # of a sprinter
@@ -68,25 +68,22 @@ class UnmeasuredWay:
         """Odds that such a way has begun by the end of a segment, before its evidence."""
         segment, heard = measured.segment, bool((measured.range_m > 0.0).any())
         self._has_heard = self._has_heard or heard
-        silent_per_s = UNSEEN_PER_S if any(self._heard) else SILENT_PER_S
+        silent_per_s = UNSEEN_PER_S if any(self._heard) or not len(measured.range_m) else SILENT_PER_S
         per_s = silent_per_s if self._has_heard and not heard else BEGINS_PER_S
-        stood = (1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s))
+        stood = max((1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s)), PRIOR)
         return (1.0 - stood) / stood
 
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        if is_step and not segment.aloft:
-            is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
-            if is_long or segment.unobserved:
-                self._look_anew(segment.t1_s)
-                return STEPPED
+        is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
+        if is_step and not segment.aloft and (is_long or segment.unobserved):
+            self._look_anew(segment.t1_s)
+            return STEPPED
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
-        for which, t_s, range_m in zip(
-            measured.ranger.tolist(), measured.t_s.tolist(), measured.range_m.tolist(), strict=True
-        ):
-            ratio += self._compared(which, range_m, t_s)
-        return ratio
+        return ratio + sum(
+            map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
+        )
 
     def _look_anew(self, t_s: float) -> None:
         """From here on the rangers hear something else."""

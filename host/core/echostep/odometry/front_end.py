@@ -145,7 +145,8 @@ class FrontEnd:
         if not len(frames.id) and not len(samples.value):
             return []
         # Time: ticks, sample counters and arrival times -> t_s of every message.
-        board, mtx = _board_arrivals(frames, frame_chunk, t_arrival_ns), _foot_arrivals(samples, t_arrival_ns)
+        board = _board_arrivals(frames, frame_chunk, t_arrival_ns)
+        mtx = Arrivals(samples.value, samples.row, t_arrival_ns[samples.row], np.full(len(samples.row), PLAIN))
         times = self.timeline.times(board, mtx)
         self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
         self._advance_clock(times)
@@ -330,11 +331,6 @@ def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arri
     sync_row, edges = frames.rows(messages.Sync)
     kind[sync_row] = edges["edge"]
     return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
-
-
-def _foot_arrivals(samples: FootSamples, t_arrival_ns: Ints) -> Arrivals:
-    """The foot's samples for the timeline."""
-    return Arrivals(samples.value, samples.row, t_arrival_ns[samples.row], np.full(len(samples.row), PLAIN))
 
 
 def _newest_timed(frames: Frames, times: Times, kind: type[messages.Message]) -> bytes | None:

@@ -86,14 +86,11 @@ def repeating(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
 
 def loose_plug(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
     """Every 12 s from the begin of the span on the MTx's bytes are missing, for 1 to 5 s in turn."""
-    return [c for c in chunks if c.port != MTX or not _is_loose(_since_s(c, span_s))]
+    since_s = [divmod(_since_s(chunk, span_s), 12.0) for chunk in chunks]
+    loose = [number >= 0.0 and at_s < 1.0 + number % 5.0 for number, at_s in since_s]
+    return [chunk for chunk, is_loose in zip(chunks, loose, strict=True) if chunk.port != MTX or not is_loose]
 
 
 def _since_s(chunk: Chunk, span_s: Span) -> float:
     """Time of arrival since the span began."""
     return 1e-9 * (chunk.t_arrival_ns - START_NS) - span_s[0]
-
-
-def _is_loose(since_s: float) -> bool:
-    number, at_s = divmod(since_s, 12.0)
-    return number >= 0.0 and at_s < 1.0 + number % 5.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.output.table import Table
 from echostep_simulation.devices.board import PythonBoard
-from echostep_simulation.people.walker import Person, Walk, Waypoint
+from echostep_simulation.people.walker import Walk, Waypoint
 from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.judgement import FALSE_TRACKING_M
 from echostep_studies.bench.sites import office
@@ -104,17 +104,15 @@ def doubt_run(names: Sequence[str], seed: int) -> list[DoubtRow]:
 def _row(name: str, kind: Kind, seed: int) -> DoubtRow:
     site = office(seed, 2.0 * BEFORE_M + 2.0 * WITHIN_M)
     way = _with_pauses(site.waypoints, STANDING_S if kind.stands else PAUSE_S)
-    spans: list[Span] = []
-
-    def befalls(walk: Walk) -> Walk:
-        spans.append(_span(walk, stands=kind.stands))
-        return kind.befalls(walk, spans[0])
-
-    scenario = Scenario(site.built, way, seed, PythonBoard(seed), Person(), befalls=befalls)
-    scenario.sensors = faults.Heard(scenario.sensors, kind.hears, spans[0])  # type: ignore[assignment]  # has its rows
+    span_of = partial(_span, stands=kind.stands)
+    scenario = Scenario(
+        site.built, way, seed, PythonBoard(seed), befalls=lambda walk: kind.befalls(walk, span_of(walk))
+    )
+    span_s = span_of(scenario.walk)
+    scenario.sensors = faults.Heard(scenario.sensors, kind.hears, span_s)  # type: ignore[assignment]  # has its rows
     tracker = Tracker(kind.plan(site.built), kind.start(scenario.start), seed=seed)
-    shown = _tracked(tracker, kind.arrives(list(scenario.chunks()), spans[0]))
-    return _judged(name, seed, shown, scenario.truth, 0.0 if name.startswith(("start", "plan")) else spans[0][0])
+    shown = _tracked(tracker, kind.arrives(list(scenario.chunks()), span_s))
+    return _judged(name, seed, shown, scenario.truth, 0.0 if name.startswith(("start", "plan")) else span_s[0])
 
 
 def _with_pauses(waypoints: Sequence[Waypoint], pause_s: float) -> list[Waypoint]:
@@ -128,13 +126,8 @@ def _with_pauses(waypoints: Sequence[Waypoint], pause_s: float) -> list[Waypoint
 def _span(walk: Walk, *, stands: bool) -> Span:
     """From the middle of the first pause on to the middle of the second, or all of the first."""
     goes = np.hypot(*np.gradient(walk.trunk_m, axis=0).T) > 1e-5
-    edges = np.flatnonzero(np.diff(goes.astype(int))) / 1000.0
-    ends = [
-        (float(a), float(b))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-        if b - a > 0.75 * PAUSE_S and not goes[int(500 * (a + b))]
-    ]
-    first, second = ends[:2]
+    edges = (np.flatnonzero(np.diff(goes.astype(int))) / 1000.0).tolist()
+    first, second = [(a, b) for a, b in pairwise(edges) if b - a > 0.75 * PAUSE_S and not goes[int(500 * (a + b))]][:2]
     return first if stands else (0.5 * sum(first), 0.5 * sum(second))
 
 

@@ -24,8 +24,8 @@ BOB_M, BOB_HZ = 0.02, 1.8
 
 def fallen_off(walk: Walk, span_s: Span) -> Walk:
     """The foot's sensor lies where the foot stood last."""
-    lies = walk.t_s >= _flat_at(walk, span_s[0])
-    first = int(np.argmax(lies))
+    first = int(np.argmax(walk.flat & (walk.t_s >= span_s[0])))
+    lies = np.arange(len(walk.t_s)) >= first
     return replace(
         walk,
         foot_m=np.where(lies[:, None], walk.foot_m[first], walk.foot_m),
@@ -65,8 +65,3 @@ def _moved(walk: Walk, span_s: Span, offset: Floats, rpy: Floats, bob: Floats) -
         walk, foot_m=(1.0 - share) * walk.foot_m + share * there, foot_rpy_rad=(1.0 - share) * walk.foot_rpy_rad + share * rpy,
         thigh_rad_s=rests * walk.thigh_rad_s, calf_rad_s=rests * walk.calf_rad_s, flat=walk.flat & (share[:, 0] == 0.0),
     )  # fmt: skip
-
-
-def _flat_at(walk: Walk, t_s: float) -> float:
-    """When the foot stands flat, from a time on."""
-    return float(walk.t_s[np.argmax(walk.flat & (walk.t_s >= t_s))])

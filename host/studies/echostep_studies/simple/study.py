@@ -41,10 +41,11 @@ NOTES = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimpleFigures:
-    """Of walks of a name: shares of the estimates, errors (m)."""
+class SimpleRow:
+    """One walk: shares of the estimates, errors (m)."""
 
     name: str
+    seed: int
     tracking: float
     lost: float
     false_tracking: float
@@ -52,13 +53,6 @@ class SimpleFigures:
     rmse_m: float
     worst_m: float
     laid_m: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimpleRow(SimpleFigures):
-    """One walk."""
-
-    seed: int
 
 
 def simple_run(names: Sequence[str], seed: int) -> list[SimpleRow]:
