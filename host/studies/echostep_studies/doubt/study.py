@@ -57,10 +57,6 @@ class Kind:
     stands: bool = False
 
 
-def _scaled(plan: Plan, by: float) -> Plan:
-    return replace(plan, levels=tuple(replace(level, walls=by * level.walls) for level in plan.levels))
-
-
 KINDS = {
     "none": Kind(),
     "stands": Kind(stands=True),
@@ -77,7 +73,7 @@ KINDS = {
     "plug": Kind(arrives=faults.loose_plug),
     "start/2m": Kind(start=lambda pose: replace(pose, x_m=pose.x_m + 2.0)),
     "start/90deg": Kind(start=lambda pose: replace(pose, heading_rad=pose.heading_rad + 0.5 * np.pi)),
-    "plan/scaled": Kind(plan=partial(_scaled, by=1.05)),
+    "plan/scaled": Kind(plan=lambda p: replace(p, levels=tuple(replace(at, walls=1.05 * at.walls) for at in p.levels))),
 }
 
 
