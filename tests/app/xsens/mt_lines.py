@@ -64,7 +64,8 @@ def on_a_terminal(device: MtxDevice) -> Iterator[str]:
             if time.monotonic() >= due_s:
                 due_s += 1.0 / device.rate_hz
                 counter += 1
-                sent += device.measure(STILL._replace(counter=counter))
+                noise = (1e-3 * (counter % 2), 0.0, 0.0)
+                sent += device.measure(STILL._replace(counter=counter, gyro=noise))
             with contextlib.suppress(BlockingIOError):
                 os.write(ours, sent)
             time.sleep(0.001)
