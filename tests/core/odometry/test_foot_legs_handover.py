@@ -221,3 +221,16 @@ def test_it_does_not_matter_how_many_chunks_come_at_once() -> None:
     scenario, chunks = walked(1)
     some = [c for c in without(chunks, MTX, 20.0, 30.0) if c.t_arrival_ns < BEGIN_NS + 45_000_000_000]
     assert digest(tracked(scenario, some, 100_000)[0]) == digest(tracked(scenario, some, 37)[0])
+
+
+@pytest.mark.parametrize(
+    ("rate_rad_s", "stands", "worn"), [(2.0, True, False), (0.2, True, True), (2.0, False, True), (np.nan, True, True)]
+)
+def test_a_foot_that_stands_while_the_leg_swings_is_not_worn(rate_rad_s: float, stands: bool, worn: bool) -> None:
+    handover = FootLegsHandover(WearerSettings())
+    for k in range(20):
+        t_s = 0.1 * k + np.arange(20) / 200.0
+        swing = rate_rad_s * np.sign(np.sin(2.0 * np.pi * t_s))
+        block = GyroBlock(t_s, swing, swing, np.zeros(20), np.full(20, np.nan))
+        handover.add_leg_block(block, float(t_s[-1]), foot_stands=stands)
+    assert handover.is_foot_worn == worn

@@ -45,7 +45,6 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan 
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 NEAR_SD_M = 2.0  # standard deviation of a place that was believed before a gap, per axis; assumed
-LEFT = 0.1  # probability that the trunk has left its place in a stand, from which on the building is searched
 UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
@@ -126,7 +125,7 @@ class MapFilter:
         if segment.unobserved:
             self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
-        if gap is not None or away > LEFT:
+        if gap is not None or away > UNOBSERVED_DOUBT:
             if gap is not Gap.UNOBSERVED:
                 belief.leave(max(UNOBSERVED_DOUBT, away))
             self._search_beside(self.cloud.air, segment.heading1_rad)

@@ -52,6 +52,7 @@ _REPORTS = (
     messages.BoardHealth,
     messages.Parts,
 )
+NOT_WORN = "the foot's sensor lies still while the leg swings: is it strapped to the shoe?"
 
 
 @dataclass(slots=True)
@@ -122,7 +123,7 @@ class FrontEnd:
             timeline.clock_steps,
             self._barometer.jumps,
             timeline.stray_edges,
-            tuple(self.path.doubts),
+            tuple(self.path.doubts) if self.handover.is_foot_worn else (NOT_WORN,),
         )
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
