@@ -125,9 +125,10 @@ class MapFilter:
         if segment.unobserved:
             self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
         # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
+        belief.leave(away if self.building.has_walls else 0.0)
         if gap is not None or away > UNOBSERVED_DOUBT:
-            if gap is not Gap.UNOBSERVED:
-                belief.leave(max(UNOBSERVED_DOUBT, away))
+            if gap is Gap.PAUSE:
+                belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.

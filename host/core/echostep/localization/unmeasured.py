@@ -22,7 +22,8 @@ BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
-STEP_M, STEP_RAD = 0.2, 0.35  # of a step that is no shuffle: its way, or its turn
+STEP_M = 0.5  # of a step that is no shuffle
+SHUFFLE_M, TURN_RAD = 0.2, 0.35  # after such a way or turn the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
@@ -38,8 +39,9 @@ class UnmeasuredWay:
 
     def __init__(self) -> None:
         self.probability = PRIOR
-        # Probability that the trunk has left where the cloud follows it; 0 unless a stand ends with the newest segment
-        self.away = 0.0
+        self.away = (
+            0.0  # probability that the trunk left its cloud in the stand that ends with the newest segment, if one does
+        )
         self._has_heard, self._is_aloft, self._step = False, False, 0
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
@@ -76,9 +78,10 @@ class UnmeasuredWay:
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        is_long = math.hypot(segment.dx_m, segment.dy_m) > STEP_M or abs(segment.turn_rad) > STEP_RAD
-        if is_step and not segment.aloft and (is_long or segment.unobserved):
+        way_m = math.hypot(segment.dx_m, segment.dy_m)
+        if is_step and (way_m > SHUFFLE_M or abs(segment.turn_rad) > TURN_RAD):
             self._look_anew(segment.t1_s)
+        if is_step and not segment.aloft and (way_m > STEP_M or segment.unobserved):
             return STEPPED
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
         return ratio + sum(
@@ -98,16 +101,14 @@ class UnmeasuredWay:
         if not abs(range_m - last_m) < ALIKE_M:
             return 0.0
         heard.append(range_m)
-        if len(heard) == 1 or t_s < self._settled_s:
-            return 0.0
-        return FARTHER if range_m > max(heard[:-1]) else NEARER
+        is_settled = len(heard) > 1 and t_s >= self._settled_s
+        return 0.0 if not is_settled else FARTHER if range_m == max(heard) else NEARER
 
     def _spread(self, segment: PathSegment) -> PathSegment:
         """Any way up to a walker's speed since the stand began, whatever the foot measured; beyond FOLLOWED_S the building is searched."""
         self._begin_s, self._spread_s = min(self._begin_s, segment.t0_s), min(self._spread_s, segment.t0_s)
         before_s, after_s = (min(t_s - self._begin_s, FOLLOWED_S) for t_s in (self._spread_s, segment.t1_s))
         sd_m = WALKER_M_S * math.sqrt(after_s**2 - before_s**2)
-        if sd_m <= UNOBSERVED_SD_M:
-            return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=0.0)
-        self._spread_s = segment.t1_s
-        return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=sd_m)
+        is_enough = sd_m > UNOBSERVED_SD_M
+        self._spread_s = segment.t1_s if is_enough else self._spread_s
+        return replace(segment, dx_m=0.0, dy_m=0.0, sd_m=sd_m if is_enough else 0.0)
