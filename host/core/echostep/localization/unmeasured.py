@@ -39,9 +39,7 @@ class UnmeasuredWay:
 
     def __init__(self) -> None:
         self.probability = PRIOR
-        self.away = (
-            0.0  # probability that the trunk left its cloud in the stand that ends with the newest segment, if one does
-        )
+        self.away = 0.0  # probability that the trunk left its cloud in a stand that has just ended
         self._has_heard, self._is_aloft, self._step = False, False, 0
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
