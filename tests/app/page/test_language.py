@@ -202,7 +202,7 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str) -> N
         table.show(connected=False)
         wait_for(page, "document.querySelector('#words').dataset.status === 'broken'")
         check()
-        people = {"echostep command", "Attack 1", "Ann", BASE.run, *NAMES}
+        people = {"echostep", "echostep command", "Attack 1", "Ann", BASE.run, *NAMES}
         assert set(page.evaluate(MISSING)) - names(TOWER) - people == set()
         assert page.evaluate(LANG) == lang
         assert not page.wrong

@@ -88,7 +88,7 @@ class TrunkPath:
             sample_index = int(np.searchsorted(t_s, due_s))
             if sample_index == len(t_s):
                 break
-            segments.append((sample_index, replace(self._standing_segment(due_s), aloft=True)))
+            segments.append((sample_index, replace(self._standing_segment(float(t_s[sample_index])), aloft=True)))
         return segments
 
     def add_stance(self, stance: Stance) -> list[PathSegment]:

@@ -179,9 +179,8 @@ def _navigate(
     """One sample of navigation: propagate, detect stance, update, write events."""
     dt, t_s, accel, gyro = sample
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
-    if (
-        ins.dot(nav.velocity, nav.velocity) > MOST_M_S**2
-    ):  # a push that was taken for a tilt, wrong samples: nothing that was learnt is right
+    # A push that was taken for a tilt, wrong samples: nothing that was learnt is right
+    if ins.dot(nav.velocity, nav.velocity) > MOST_M_S**2:
         for i in range(3):
             nav.gyro_bias[i] = 0.0
             nav.accel_bias[i] = 0.0
