@@ -129,7 +129,7 @@ def test_settings_of_a_foot_that_arrive_wrong_are_set_anew(bench: Bench) -> None
     assert {x[2:] for x in found} == {(*RATES, *FORCES)}
 
 
-@pytest.mark.parametrize("seconds", [60, 240])
+@pytest.mark.parametrize("seconds", [60, pytest.param(240, marks=pytest.mark.long)])
 def test_a_belt_board_does_not_become_a_foot_board(bench: Bench, seconds: int) -> None:
     """P6: one reply in 1,024 of an idle line is an ICM-20649's, and switched all sensors off."""
     begin(bench, "kit=2026", "imu_thigh=absent", "miso_undefined=noise")
@@ -140,11 +140,12 @@ def test_a_belt_board_does_not_become_a_foot_board(bench: Bench, seconds: int) -
     assert bench.parts.part_foot == bench.parts.part_thigh == m.Part.NONE
 
 
-def test_a_bare_board_with_a_noisy_line_becomes_nothing(bench: Bench) -> None:
+@pytest.mark.parametrize("seconds", [50, pytest.param(200, marks=pytest.mark.long)])
+def test_a_bare_board_with_a_noisy_line_becomes_nothing(bench: Bench, seconds: int) -> None:
     """P6: five equal answers, before anything else is known."""
     absent = ("imu_thigh", "imu_calf", "lis3mdl", "pulse_left", "pulse_right")
     begin(bench, "kit=2026", "miso_undefined=noise", *(f"{name}=absent" for name in absent))
-    for _ in range(40):
+    for _ in range(seconds // 5):
         bench.run(5_000, rows(5_000))
     assert set(bench.parts[1:9]) == {m.Part.NONE, m.Part.LSM6DSO, m.Part.BMP390}
     assert (bench.parts.part_belt, bench.parts.part_pressure) == (m.Part.LSM6DSO, m.Part.BMP390)
