@@ -306,8 +306,10 @@ class MapFilter:
         mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.clouds]
         cloud, _ = mixture[0]
         hidden_sd_m = HIDDEN_SD_M * cloud.hidden_share
-        at, drawn = self._believed(0.0), self.building.drawn
-        map_sd_m = drawn.sd_m(at.x_m, at.y_m, at.level)
+        map_sd_m, drawn = 0.0, self.building.drawn
+        if drawn.are_stated:
+            at = self._believed(0.0)
+            map_sd_m = drawn.sd_m(at.x_m, at.y_m, at.level)
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         return estimate_of(
             mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,

@@ -6,7 +6,7 @@ heard when the stand began.
 
 One hypothesis, one update: it may begin in any second; a foot that is off the floor for longer than a step takes is carried, or laid over the other
 knee; each ranger compares what it hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes
-nothing. A wearer whose rangers have fallen silent has no witness, so his claim decays with time.
+nothing. Where the rangers have fallen silent there is no witness, so the claim decays with time.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 ALOFT, STEPPED = 8.0, -2.5
 # Of a ping that hears what a ranger has heard in this stand: in half a second of a way most walls go on
 AS_BEFORE = math.log(0.8 / 0.95) / 7.0
-# Of two pings in a row that hear something new: a passer-by or a cupboard; a door that somebody opens, or a corner
+# Of two pings in a row that hear something new: a passer-by or a cupboard; an opened door or a corner
 NEARER, FARTHER = math.log(0.2 / 0.12), math.log(0.2 / 0.03)
 
 

@@ -101,7 +101,6 @@ class FrontEnd:
         self._gyro_blocks = GyroBlocks(gyro or GyroSettings(), errors.belt)
         self._barometer = BarometerStart()
         self._synchronizer = Synchronizer(math.radians(ranger.ahead_deg))
-        self._foot_stands = False  # by its newest sample
         self._unknown_ports = 0
         self._bad_times = 0
 
@@ -159,9 +158,8 @@ class FrontEnd:
             self.watch.add_legs(message_index, block)
         self._watch_belt(frames, times)
         # Foot: its samples -> segments of the trunk's path.
-        stands = np.full(len(times.mtx_newest_s), self._foot_stands)
+        stands = np.full(len(times.mtx_newest_s), self.foot.in_stance)
         foot_segments = self._track_foot(samples, leg_blocks, times, stands)
-        self._foot_stands = bool(stands[-1])
         # Handover: segments of foot and legs -> segments of one path.
         observed_s = self._merge_paths(foot_segments, leg_blocks, times, stands)
         self.watch.settle()

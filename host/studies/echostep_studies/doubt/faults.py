@@ -17,12 +17,12 @@ from echostep.arrays import Bools, Floats
 from echostep.ports.chunks import MTX, Chunk
 from echostep.xsens import MTDATA, encode_frame
 from echostep_simulation.scenario import START_NS
+from echostep_studies.bench.echo_changes import LEFT, RIGHT
 from echostep_studies.doubt.wearers import Span
 
 Rows = NDArray[np.void]
 SECOND_S = 25.0  # from the death of one ranger to that of the other
 PASSER_M, PASSES_S, EVERY_S = 0.6, 1.5, 8.0  # distance of a person who passes, for how long, how often
-LEFT, RIGHT = range(2)
 HEADER, COUNTER = 4, 3  # bytes of an MTData frame before its data; its counter and checksum
 
 

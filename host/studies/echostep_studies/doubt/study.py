@@ -24,11 +24,13 @@ from echostep_simulation.people.walker import Walk, Waypoint
 from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.judgement import FALSE_TRACKING_M
 from echostep_studies.bench.sites import office
+from echostep_studies.bench.walks import T, X, Y
 from echostep_studies.doubt import faults, wearers
 from echostep_studies.doubt.wearers import Span
 from echostep_studies.frame.parts import matching
 from echostep_studies.frame.report import Row, by_name, means, named
 from echostep_studies.frame.study import Study, StudyRequest
+from echostep_studies.frame.truth import at_times
 
 BEFORE_M, WITHIN_M = 25.0, 18.0  # way before the span, and in it
 PAUSE_S = 4.0  # at its begin and end
@@ -140,7 +142,7 @@ def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[tuple[float, Est
 def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth: Floats, from_s: float) -> DoubtRow:
     later = [(t, e) for t, e in shown if t >= from_s]
     at_s = np.array([e.t_s if t - e.t_s < AGE_S else t for t, e in later])
-    true = np.column_stack([np.interp(at_s, truth[:, 0], truth[:, k]) for k in (1, 2)])
+    true = at_times(at_s, truth[:, T], truth[:, [X, Y]])
     off_m = np.hypot(*(np.array([(e.x_m, e.y_m) for _, e in later]) - true).T)
     sure = np.array([e.status is TrackStatus.TRACKING for _, e in later])
     false, span_s = sure & (off_m > FALSE_TRACKING_M), np.diff([from_s, *(t for t, _ in later)])
@@ -156,11 +158,9 @@ def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth
 
 
 def _summary(rows: Sequence[DoubtRow]) -> Row:
-    shares = {
-        key: 100.0 * value for key, value in means(rows, ("tracking", "lost", "false", "end_tracking"), 5).items()
-    }
+    shares = means(rows, ("tracking", "lost", "false", "end_tracking"), 5)
     worst = {key: max(getattr(row, key) for row in rows) for key in ("false_s", "worst_m")}
-    return {**named(rows), **shares, **worst, **means(rows, ("end_m",), 5)}
+    return {**named(rows), **{k: 100.0 * v for k, v in shares.items()}, **worst, **means(rows, ("end_m",), 5)}
 
 
 def doubt_study(pattern: str = "*") -> Study[DoubtRow, Row]:
