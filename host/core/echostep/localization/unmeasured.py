@@ -4,15 +4,16 @@
 In: `MeasuredSegment`s in order of time. Out: the same; where the rival wins, as segments that were not observed. Owns its odds, and what each ranger
 heard when the stand began.
 
-One hypothesis, one update: it may begin in any second; a foot that is off the floor for longer than a step takes is carried, or laid over the other
-knee; each ranger compares what it hears with what it heard when the stand began. A passer-by is nearer and goes again; a way along a wall changes
-nothing. Where the rangers have fallen silent there is no witness, so the claim decays with time.
+One hypothesis, one update: it may begin in any second; a foot that is off the floor for longer than a step takes is carried; each ranger compares
+what it hears with what it heard when the stand began. Where the rangers have fallen silent there is no witness, so the claim decays with time.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+
+import numpy as np
 
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
@@ -22,8 +23,8 @@ BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
-STEP_M = 0.5  # of a step that is no shuffle
-SHUFFLE_M, TURN_RAD = 0.2, 0.35  # after such a way or turn the rangers hear something else
+STEP_M = 0.5  # of a step that is no shuffle; a shorter one speaks by its share
+SHUFFLE = np.array([0.2, 0.2, 0.35])  # m, m, rad: after such a way or turn the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
@@ -76,12 +77,13 @@ class UnmeasuredWay:
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        way_m = math.hypot(segment.dx_m, segment.dy_m)
-        if is_step and (way_m > SHUFFLE_M or abs(segment.turn_rad) > TURN_RAD):
+        if is_step:
+            self._shift += segment.dx_m, segment.dy_m, segment.turn_rad
+        if (np.abs(self._shift) > SHUFFLE).any():
             self._look_anew(segment.t1_s)
-        if is_step and not segment.aloft and (way_m > STEP_M or segment.unobserved):
-            return STEPPED
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
+        if is_step and not segment.aloft:
+            ratio = STEPPED * (1.0 if segment.unobserved else min(math.hypot(segment.dx_m, segment.dy_m) / STEP_M, 1.0))
         return ratio + sum(
             map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
         )
@@ -90,6 +92,7 @@ class UnmeasuredWay:
         """From here on the rangers hear something else."""
         self._heard: tuple[list[float], list[float]] = ([], [])
         self._last, self._settled_s = [math.nan, math.nan], t_s + SETTLING_S
+        self._shift = np.zeros(3)
 
     def _compared(self, which: int, range_m: float, t_s: float) -> float:
         """Log-likelihood ratio of a ping of the stand; NaN: no echo."""
