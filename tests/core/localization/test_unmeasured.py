@@ -53,10 +53,12 @@ def test_rangers_that_fall_silent_are_no_witness_and_a_step_is() -> None:
     assert way.probability < 10.0 * PRIOR
 
 
-def test_who_never_heard_anything_has_lost_no_witness() -> None:
+@pytest.mark.parametrize("shuffle_m", [0.0, 0.15])
+def test_who_never_heard_anything_has_lost_no_witness_and_who_shuffles_goes(shuffle_m: float) -> None:
     way = UnmeasuredWay()
     for k in range(1200):
-        way.weighed(piece(k, NOTHING))
+        heard = (1.0 + 0.7 * (k // 2 % 3), math.nan) if shuffle_m and k % 20 < 10 else NOTHING
+        way.weighed(piece(k, heard, step=k if shuffle_m else 1, way_m=shuffle_m))
     assert way.probability < 0.1
 
 
@@ -64,10 +66,8 @@ def test_echoes_that_change_beside_a_standing_foot_are_a_way() -> None:
     way, found = stood(lambda k: (1.0 + 0.4 * k, 9.0 - 0.5 * k) if k > 2 else WALLS, 12)
     assert found[1] == pytest.approx(PRIOR, rel=2.0)
     assert way.has_moved
-    variance = 0.0
-    for k in range(13, 17):
-        variance += way.weighed(piece(k, (2.0 + k, 30.0 - k))).segment.sd_m ** 2
-    assert variance == 0.0  # it was followed before
+    followed = [way.weighed(piece(k, (2.0 + k, 30.0 - k))).segment for k in range(13, 17)]
+    assert [segment.sd_m for segment in followed] == [0.0] * 4  # it was spread before
     assert way.weighed(piece(17, WALLS, step=2, way_m=1.2)).segment.dx_m == 0.0  # one step is no proof
 
 

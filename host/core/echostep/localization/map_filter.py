@@ -198,14 +198,12 @@ class MapFilter:
     def _height_change(self, measured: MeasuredSegment) -> HeightChange:
         """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
-        if anew:
-            self._barometer_starts = measured.barometer_starts
         for part in self.belief.parts:
+            part.let_lag_drift(self._gaps.pause_s)
             if anew:
                 part.forget_lag()
-            else:
-                part.let_lag_drift(self._gaps.pause_s)
         if anew:
+            self._barometer_starts = measured.barometer_starts
             self._riding.forget()
             if self._height is not None:
                 self._height.forget_lag()
@@ -226,9 +224,8 @@ class MapFilter:
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it. Returns the move and its pings."""
         segment, belief, walls = measured.segment, self.belief, self.building.walls
-        pings, unplanned = self._pings.take(
-            self._bias.corrected(measured) if self.building.has_walls else measured.without_pings
-        )
+        heard = self._bias.corrected(measured) if self.building.has_walls else measured.without_pings
+        pings, unplanned = self._pings.take(heard)
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
         clouds, share = belief.clouds, evidence_share(segment.turn_rad)
