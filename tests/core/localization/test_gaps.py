@@ -13,7 +13,7 @@ import pytest
 
 from board_runs import ROOT
 from echostep.localization import Estimate, TrackStatus
-from echostep.localization.motion import LONG_S, PAUSE_S, Gap, Gaps
+from echostep.localization.unmeasured import LONG_S, PAUSE_S, UNOBSERVED_DOUBT, UnmeasuredWay
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.plan import load_plan
 from echostep.tracker import Tracker
@@ -26,28 +26,28 @@ def segment(t0_s: float, t1_s: float, length_m: float = 0.7, sd_m: float = 0.02,
     return MeasuredSegment(path, t_s, np.zeros(pings, np.int64), np.ones(pings))
 
 
-def found(*segments: MeasuredSegment) -> list[Gap | None]:
-    gaps = Gaps()
-    return [gaps.ended(each) for each in segments]
+def away(*segments: MeasuredSegment) -> list[bool]:
+    """Whether the trunk may have left its cloud before the end of each segment."""
+    way = UnmeasuredWay()
+    return [bool(way.weighed(each)) and way.away >= UNOBSERVED_DOUBT for each in segments]
 
 
-def test_a_walk_has_no_gap() -> None:
-    assert found(*(segment(0.5 * k, 0.5 * k + 0.5) for k in range(60))) == [None] * 60
+@pytest.mark.parametrize("pings", [0, 5])
+def test_a_walk_has_no_gap(pings: int) -> None:
+    assert not any(away(*(segment(0.5 * k, 0.5 * k + 0.5, pings=pings) for k in range(60))))
 
 
-def test_a_walk_without_rangers_has_no_gap() -> None:
-    assert found(*(segment(0.5 * k, 0.5 * k + 0.5, pings=0) for k in range(60))) == [None] * 60
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_pause_is_one_that_nothing_covers(share: float) -> None:
+    pause_s = share * PAUSE_S
+    assert away(segment(0.0, 0.5), segment(0.5 + pause_s, 1.0 + pause_s)) == [False, share > 1.0]
 
 
-@pytest.mark.parametrize(("pause_s", "gap"), [(0.9 * PAUSE_S, None), (1.1 * PAUSE_S, Gap.PAUSE)])
-def test_a_pause_is_one_that_nothing_covers(pause_s: float, gap: Gap | None) -> None:
-    assert found(segment(0.0, 0.5), segment(0.5 + pause_s, 1.0 + pause_s)) == [None, gap]
-
-
-@pytest.mark.parametrize(("span_s", "gap"), [(0.9 * LONG_S, None), (1.1 * LONG_S, Gap.UNOBSERVED)])
-def test_a_long_unobserved_segment_is_a_gap(span_s: float, gap: Gap | None) -> None:
-    silent = segment(0.5, 0.5 + span_s, sd_m=2.0 * UNOBSERVED_SD_M)
-    assert found(segment(0.0, 0.5), silent, segment(0.5 + span_s, 1.0 + span_s)) == [None, gap, None]
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_long_unobserved_segment_is_a_gap(share: float) -> None:
+    end_s = 0.5 + share * LONG_S
+    silent = segment(0.5, end_s, sd_m=2.0 * UNOBSERVED_SD_M)
+    assert away(segment(0.0, 0.5), silent, segment(end_s, end_s + 0.5)) == [False, share > 1.0, False]
 
 
 @pytest.mark.parametrize(

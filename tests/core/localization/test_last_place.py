@@ -11,8 +11,8 @@ import pytest
 from echostep.height.levels import Air, ClimbSettings
 from echostep.localization import Building, FilterSettings, MapFilter, Start
 from echostep.localization.belief import PLAN_FITS
-from echostep.localization.map_filter import UNOBSERVED_DOUBT
 from echostep.localization.particles.start import STATED
+from echostep.localization.unmeasured import UNOBSERVED_DOUBT
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose
 from echostep.walls.level_sheet import lay_out_levels

@@ -32,6 +32,7 @@ CALM, STILL = 0.25, 0.03  # `stillness_statistic` of a standing foot, and of a f
 GATE = 16.8  # chi-square with six degrees of freedom (three velocities, three accelerations), 99 % quantile
 ROLL_M_S2 = 2.0  # acceleration of a sensor on a foot that rolls
 MOST_EXCESS = 1e3
+UNKNOWN_YAW_RAD2 = math.pi**2 / 3.0  # variance of any yaw alike
 # Difference between a resting foot's force and gravity, with the bias of a sensor; a shuffling foot shows 1 to 4
 GRAVITY_ALONE_M_S2 = 1.0
 # Greatest change of that force while a foot rests, twice the above; a foot that glides brakes at 4 to 6 m/s2
@@ -215,14 +216,17 @@ def inflate_covariance(nav: Nav, excess: float) -> None:
     """Multiply the covariance of all errors but the biases by `excess` (cross-covariances with the biases by its root).
 
     Applied when a stance is accepted although its normalized innovation exceeds the gate: the errors grew faster since the last rest than
-    modelled. The correlations are kept, so position, velocity and attitude are corrected together.
+    modelled. The correlations are kept, so position, velocity and attitude are corrected together. Nothing here measures the yaw: it has a limit.
     """
-    factor = math.sqrt(min(excess, MOST_EXCESS))
+    most = math.sqrt(min(excess, MOST_EXCESS))
+    yaw = min(most, math.sqrt(UNKNOWN_YAW_RAD2 / nav.P[ins.YAW, ins.YAW]))
     for i in range(ins.SIZE):
-        if i < ins.GYRO_BIAS or i == ins.YAW:
-            for j in range(ins.SIZE):
-                nav.P[i, j] *= factor
-                nav.P[j, i] *= factor
+        for j in range(i + 1):
+            factor = 0.5
+            for k in (i, j):
+                factor *= most if k < ins.GYRO_BIAS else yaw if k == ins.YAW else 1.0
+            # By their mean: else what rounding has made uneven grows, too
+            nav.P[i, j] = nav.P[j, i] = factor * (nav.P[i, j] + nav.P[j, i])
 
 
 @lean_part

@@ -74,7 +74,7 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
             for i in range(3):
                 rows[k, out.ROW_POSITION + i] = nav.position[i]
             rows[k, out.ROW_HEADING] = ins.heading(nav)
-            rows[k, out.ROW_IN_STANCE] = s.in_stance
+            rows[k, out.ROW_IN_STANCE] = s.in_stance * (1 - s.pushed)
             rows[k, out.ROW_EVENT_COUNT] = event_count
     return event_count
 
@@ -115,7 +115,7 @@ def _restart(
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
-    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, math.pi**2 / 3.0)
+    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, stance.UNKNOWN_YAW_RAD2)
     if s.in_stance:
         event_count = _end_stance(s, nav, compass, events, event_count)
     if s.levelled:
@@ -190,6 +190,8 @@ def _navigate(
     if not s.in_stance:
         s.swing_rad_s = max(s.swing_rad_s, math.sqrt(ins.dot(gyro, gyro)))
         s.flight_s += dt
+    else:
+        unrest.feel_push(s, nav, accel, gyro, dt)
     if not _update_if_resting(s, nav, window, sample):
         stance.clear_rest(sums)
         s.rest_s = 0.0
@@ -240,6 +242,8 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         if s.lasting_s < stance.LASTING_S and since_s < stance.OVERDUE_S:
             return False
         s.forced += 1
+        east, north, _ = ins.difference(nav.velocity, expected)
+        s.pushed = max(s.pushed, int(east * east + north * north > unrest.PUSHED_M_S**2))
         s.doubt_s += dt
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
@@ -338,7 +342,7 @@ def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, e
     row[out.KIND], row[out.START_S], row[out.END_S] = out.STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
     row[out.HEADING] = s.rest_yaw_rad
     s.stance_end_s = row[out.END_S]
-    s.in_stance = 0
+    s.in_stance = s.pushed = 0
     s.swing_rad_s = s.flight_s = 0.0
     unrest.judge(s, row[out.END_S] - row[out.START_S])
     if not s.settled:

@@ -71,6 +71,10 @@ class ZuptState(Protocol):
     unrest: float
     judged: int  # stances in it
     height_m: float  # of the sensor above the sole's contact with the floor
+    push_s: float  # of this stance, see `unrest`
+    push_gravity: Floats
+    push_m_s: Floats
+    pushed: int  # the floor moves
 
 
 class ZuptInsState(NamedTuple):

@@ -25,12 +25,12 @@ from echostep.localization.estimate import Estimate
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.grid.start import grid_about, grid_of, is_unknown
-from echostep.localization.motion import HEIGHT_SD_M, Gap, Gaps, height_change, move_of
+from echostep.localization.motion import HEIGHT_SD_M, height_change, move_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.start import STATED, Start, wide
 from echostep.localization.settings import FilterSettings, echo_models, inexact, with_plan_error
-from echostep.localization.unmeasured import UnmeasuredWay
+from echostep.localization.unmeasured import UNOBSERVED_DOUBT, UnmeasuredWay
 from echostep.localization.window import RecentWay
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.kernels import systematic
@@ -45,7 +45,6 @@ EXACT_SD_M = 0.005  # least standard deviation per axis of an estimate: no plan 
 HIDDEN_SD_M = 0.15
 BY_DEFINITION = 1.0 - 1e-6  # without a plan: the map begins where the walk began, and no echo can contradict that
 NEAR_SD_M = 2.0  # standard deviation of a place that was believed before a gap, per axis; assumed
-UNOBSERVED_DOUBT = 0.2  # probability that a move which was not observed led out of the scattered cloud, assumed
 
 
 class MapFilter:
@@ -68,7 +67,7 @@ class MapFilter:
         self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
         self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
-        self._gaps, self._unmeasured = Gaps(), UnmeasuredWay()
+        self._unmeasured = UnmeasuredWay(on_plan=building.has_walls)
         self._way = RecentWay(wide(start), walk_heading_rad)  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
@@ -114,21 +113,17 @@ class MapFilter:
 
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
-        # 0. The trunk may have moved though no step was measured.
+        # 1. The trunk may have moved though no step was measured.
         measured = self._unmeasured.weighed(measured)
-        segment, belief = measured.segment, self.belief
-        # 1. Kind of the last gap: a pause, a way that was not observed, rangers that were silent.
-        gap, away = self._gaps.ended(measured), self._unmeasured.away
+        segment, belief, away = measured.segment, self.belief, self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis.
         if segment.unobserved:
-            self._scatter(segment, change, is_long=gap is Gap.UNOBSERVED)
-        # 4. After a gap the wearer may be elsewhere: a rest, a ride in a lift, a walk.
-        belief.leave(away if self.building.has_walls else 0.0)
-        if gap is not None or away > UNOBSERVED_DOUBT:
-            if gap is Gap.PAUSE:
-                belief.leave(UNOBSERVED_DOUBT)
+            self._scatter(segment, change)
+        # 4. After a stand, a pause, a long way that was not observed, the wearer may be elsewhere.
+        belief.leave(away)
+        if away >= UNOBSERVED_DOUBT:
             self._search_beside(self.cloud.air, segment.heading1_rad)
         # 5. Along an observed way each hypothesis moves, and is weighed by pings, walls and heights.
         # 6. The hypotheses are compared, and the rangers' bias is learnt from the likeliest.
@@ -199,7 +194,7 @@ class MapFilter:
         """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""
         anew = len(measured.height_m) > 0 and measured.barometer_starts != self._barometer_starts
         for part in self.belief.parts:
-            part.let_lag_drift(self._gaps.pause_s)
+            part.let_lag_drift(self._unmeasured.pause_s)
             if anew:
                 part.forget_lag()
         if anew:
@@ -207,18 +202,16 @@ class MapFilter:
             self._riding.forget()
             if self._height is not None:
                 self._height.forget_lag()
-        self._riding.add(measured.height_m, self._gaps.pause_s + measured.segment.t1_s - measured.segment.t0_s)
+        self._riding.add(measured.height_m, self._unmeasured.pause_s + measured.segment.t1_s - measured.segment.t0_s)
         change = height_change(measured, self._riding.height_m)
         if self._height is not None:
             self._height.update(change)
         return change
 
-    def _scatter(self, segment: PathSegment, change: HeightChange, *, is_long: bool) -> None:
+    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
         """Spread the hypotheses over an unobserved segment, straight through the building."""
         for each in self.belief.clouds:
             each.cloud.scatter(move_of(segment), change)
-        if is_long:
-            self.belief.leave(UNOBSERVED_DOUBT)
         self._way.clear()
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:

@@ -23,24 +23,30 @@ BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
+PAUSE_S, LONG_S = (
+    1.0,
+    5.0,
+)  # between two segments: nothing was received; of an unobserved segment: a walk out of the room
+UNOBSERVED_DOUBT = 0.2  # probability that such a way led out of the scattered cloud
 STEP_M = 0.5  # of a step that is no shuffle; a shorter one speaks by its share
 SHUFFLE = np.array([0.2, 0.2, 0.35])  # m, m, rad: after such a way or turn the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
 ALOFT, STEPPED = 8.0, -2.5
-# Of a ping that hears what a ranger has heard in this stand: in half a second of a way most walls go on
-AS_BEFORE = math.log(0.8 / 0.95) / 7.0
+# Of a ping that hears what a ranger has heard in this stand: in half a second of a way most walls go on, those of a corridor for long
+AS_BEFORE = math.log(0.92 / 0.95) / 7.0
 # Of two pings in a row that hear something new: a passer-by or a cupboard; an opened door or a corner
 NEARER, FARTHER = math.log(0.2 / 0.12), math.log(0.2 / 0.03)
 
 
 class UnmeasuredWay:
-    """Call `weighed` with every segment."""
+    """Call `weighed` with every segment. `on_plan`: a trunk that left its cloud in a stand can be found again."""
 
-    def __init__(self) -> None:
-        self.probability = PRIOR
-        self.away = 0.0  # probability that the trunk left its cloud in a stand that has just ended
+    def __init__(self, *, on_plan: bool = True) -> None:
+        self.probability, self._on_plan = PRIOR, on_plan
+        self.away = 0.0  # probability that the trunk left its cloud in a stand or gap that has just ended
+        self.pause_s, self._end_s = 0.0, math.inf  # between the last two segments; end of the last one
         self._has_heard, self._is_aloft, self._step = False, False, 0
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
@@ -59,9 +65,11 @@ class UnmeasuredWay:
         is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
         odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
-        self.away, stood_s = 0.0, segment.t0_s - self._begin_s
+        self.pause_s, self._end_s = max(segment.t0_s - self._end_s, 0.0), segment.t1_s
+        is_gap = self.pause_s > PAUSE_S or (segment.unobserved and segment.t1_s - segment.t0_s > LONG_S)
+        self.away, stood_s = UNOBSERVED_DOUBT if is_gap else 0.0, segment.t0_s - self._begin_s
         if is_step and not self.has_moved:
-            self.away = before * (1.0 - FOLLOWED_S / stood_s) if stood_s > FOLLOWED_S else 0.0
+            self.away = max(self.away, self._on_plan * before * (1.0 - FOLLOWED_S / max(stood_s, FOLLOWED_S)))
             self._begin_s = self._spread_s = segment.t1_s
         return replace(measured, segment=self._spread(segment)) if self.has_moved else measured
 
