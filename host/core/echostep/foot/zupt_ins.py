@@ -38,7 +38,6 @@ LEVEL_S = 0.1  # still for this long: gravity can be measured
 IMPATIENT_S = 3.0  # after this long without such a moment, any sample that may be a stance levels the foot
 STILL_TILT_RAD, UNSURE_TILT_RAD = 0.05, 0.3
 UNSURE_YAW_RAD2_S = 1.0
-DOUBT_S = 0.1  # of stances against the innovation gate: the level is wrong
 FLAT_M = 0.04  # a step that rises less is on a level floor, not on a stair, kerb or ramp
 FLAT_SDS = 2.0  # a rise within this many standard deviations is drift: in a runner's step, whose sd is 0.05 to 0.1 m, always downwards
 RISER_M = 0.15  # a greater rise may be a stair: least riser of ISO 21542
@@ -122,7 +121,7 @@ def _restart(
         s.yaw_rad = ins.heading(nav)
     stance.clear_rest(sums)
     s.levelled = 0
-    s.still_s = s.lasting_s = s.doubt_s = s.waited_s = s.rest_s = s.flight_s = 0.0
+    s.still_s = s.lasting_s = s.waited_s = s.rest_s = s.flight_s = 0.0
     return event_count
 
 
@@ -200,8 +199,6 @@ def _navigate(
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
             event_count = _end_stance(s, nav, compass, events, event_count)
         return event_count
-    if s.doubt_s > DOUBT_S:
-        return _restart(s, nav, sums, compass, dt, events, event_count)
     s.rest_s += dt
     s.rest_end_s = t_s
     s.rest_yaw_rad = ins.heading(nav)
@@ -244,10 +241,8 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         s.forced += 1
         east, north, _ = ins.difference(nav.velocity, expected)
         s.pushed = max(s.pushed, int(east * east + north * north > unrest.PUSHED_M_S**2))
-        s.doubt_s += dt
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
-        s.doubt_s = 0.0
         unrest.accumulate(s, nav, sample.gyro, level, dt)
     stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
     return True

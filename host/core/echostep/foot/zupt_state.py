@@ -35,7 +35,6 @@ class ZuptState(Protocol):
     still_s: float
     lasting_s: float  # of calm in which gravity alone is felt, from one direction
     lasting_force: Floats  # specific force (walk frame) when it began
-    doubt_s: float  # of rest against the innovation gate
     force_sum: Floats
     force_count: int
     lost_s: float  # of missing samples, not yet in the covariance
