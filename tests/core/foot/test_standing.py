@@ -15,7 +15,7 @@ from echostep.foot import ins, stance
 from echostep.foot.steps import FootCounts, Stance, Step, Track, walk_track
 from echostep.offline.imu_csv import describe_track
 from foot.foot_walks import Samples, moves, walking
-from foot.test_foot import copied, errors_between, some_nav
+from foot.test_foot import some_nav
 
 HEIGHT_M = 0.08
 
@@ -37,21 +37,28 @@ def test_velocity_of_a_standing_foot_agrees_with_its_twin() -> None:
     assert stance.standing_velocity(nav, window, HEIGHT_M) == pytest.approx(expected, abs=1e-9)
 
 
-def test_update_but_the_gyro_bias_agrees_with_the_textbook() -> None:
-    """The gain of the bias is zero; the covariance that follows from any gain, optimal or not, is Joseph's."""
-    rng = np.random.default_rng(5)
-    bias = slice(ins.GYRO_BIAS, ins.GYRO_BIAS + 3)
-    for at in range(ins.VEL, ins.VEL + 3):
-        nav = some_nav(rng)
-        before = copied(nav)
-        error, variance = 1e-3 * float(rng.standard_normal()), 0.3
-        ins.update_but_gyro_bias(nav, at, error, variance)
-        h = np.eye(ins.SIZE)[at : at + 1]
-        gain = before.P @ h.T / (h @ before.P @ h.T + variance)
-        gain[bias] = 0.0
-        joseph = np.eye(ins.SIZE) - gain @ h
-        assert pytest.approx(joseph @ before.P @ joseph.T + variance * gain @ gain.T, abs=1e-9) == nav.P
-        assert errors_between(before, nav) == pytest.approx((gain * error)[:15, 0], rel=1e-4, abs=1e-9)
+def test_a_covariance_that_grows_again_and_again_stays_one() -> None:
+    """As on a trolley: a hundred times against the gate, each followed by an update."""
+    nav = some_nav(np.random.default_rng(5))
+    for at in np.tile(range(ins.VEL, ins.VEL + 3), 100):
+        stance.inflate_covariance(nav, stance.MOST_EXCESS)
+        ins.update_but_gyro_bias(nav, at, 0.0, 1e-4)
+    assert pytest.approx(nav.P.T, abs=1e-9) == nav.P
+    assert nav.P[ins.YAW, ins.YAW] <= 1.001 * stance.UNKNOWN_YAW_RAD2
+
+
+@pytest.mark.parametrize(("push_m_s2", "turn_rad_s", "end_s"), [(0.4, 0.0, 5.0), (0.0, 0.1, 3.5)])
+def test_a_push_is_a_floor_that_moves_and_a_tilt_is_none(push_m_s2: float, turn_rad_s: float, end_s: float) -> None:
+    """A trolley starts, or the foot turns until it feels as much."""
+    rng, t = np.random.default_rng(1), np.arange(800) / 100.0
+    during = (t > 3.0) & (t < end_s)
+    tilt = np.cumsum(turn_rad_s * during) / 100.0
+    ahead = push_m_s2 * during - ins.GRAVITY_M_S2 * np.sin(tilt)
+    accel = np.column_stack([ahead, 0.0 * t, ins.GRAVITY_M_S2 * np.cos(tilt)]) + 0.03 * rng.standard_normal((800, 3))
+    gyro = np.column_stack([0.0 * t, turn_rad_s * during, 0.0 * t]) + 0.01 * rng.standard_normal((800, 3))
+    in_stance = walk_track(t, accel, gyro).stance
+    assert in_stance[250]
+    assert in_stance[-1] == (push_m_s2 == 0.0)
 
 
 def test_a_glide_is_no_rest() -> None:

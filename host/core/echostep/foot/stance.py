@@ -211,7 +211,7 @@ def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float)
         ins.update_but_gyro_bias(nav, VEL + i, expected[i] - nav.velocity[i], variance * repeated)
 
 
-@lean_part
+@lean_kernel
 def inflate_covariance(nav: Nav, excess: float) -> None:
     """Multiply the covariance of all errors but the biases by `excess` (cross-covariances with the biases by its root).
 
