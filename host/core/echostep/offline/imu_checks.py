@@ -16,6 +16,7 @@ from echostep.arrays import Floats, spans
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
 from echostep.offline.csv_table import rate_complaint
+from echostep.xsens.reader import HELD
 
 TIME = 0  # columns of the table
 FORCE = slice(1, 4)
@@ -38,6 +39,7 @@ MISSING_SHARE = 0.02  # share of missing samples that is reported
 CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
 FEWEST_REPEATS = 3  # of equal neighbours at the limit
 FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
+DEAD_SHARE = 0.5  # share of rows that repeat, from which on a sensor is dead
 DEAD_S = 2.0  # longest time without a change while the foot moves
 MOVING_RAD_S = 0.5  # rate of a moving foot
 MOVING_SHARE = 0.1  # of a stretch without a change in which the foot moves
@@ -52,11 +54,13 @@ LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no f
 
 
 def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows with a number in each of the first seven columns, and a note on those left out."""
-    whole = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1)
-    if whole.all():
-        return table, ()
-    return table[whole], (f"{int((~whole).sum())} rows without a number in some column: skipped",)
+    """The rows with a number in each of the first seven columns, measured anew, and notes on those left out: a sensor that repeats has stopped."""
+    whole, held = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1), np.zeros(len(table), np.bool_)
+    for begin, end in spans((np.diff(table[:, FORCE.start : RATE.stop], axis=0) == 0.0).all(1)).tolist():
+        held[begin + 1 : end + 1] = end - begin > HELD
+    held &= whole & (held.mean() < DEAD_SHARE)
+    found = {"without a number in some column: skipped": ~whole, "repeat the one before them: taken as missing": held}
+    return table[whole & ~held], tuple(f"{int(rows.sum())} rows {what}" for what, rows in found.items() if rows.any())
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
