@@ -41,7 +41,8 @@ QUANTITIES = {"t_s": "time", "pressure_pa": "pressure", "compass_rad": "angle"} 
 }
 RATE = re.compile(r"g[xyz]|(thigh|shank)_[xyz]|\w+_rad_s")
 COUNTER, COUNTER_PERIOD = "PacketCounter", 1 << 16  # of the samples, in exports of MT Manager
-DOT_CLOCK, DOT_CLOCK_HZ, DOT_CLOCK_PERIOD = "SampleTimeFine", 1e6, 1 << 32  # microseconds, in exports of Movella DOT
+# Microseconds in exports of Movella DOT, tenths of a millisecond in those of MT Manager
+CLOCK, DOT_CLOCK_HZ, MT_CLOCK_HZ, CLOCK_PERIOD = "SampleTimeFine", 1e6, 1e4, 1 << 32
 DOT = "DeviceTag:"  # begins a line above the names of the columns
 DOT_PREAMBLE = r"sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
 SENSORS = ",left_sensor,"  # begins a line above the names of the columns of gaitmap
@@ -84,7 +85,7 @@ LOGGERS = (
     Logger("phyphox", {"t_s": "Time (s)"} | PHYPHOX),
     Logger("phyphox", {"t_s": "Time (s)", "pressure_pa": "Pressure (hPa)"}),
     Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
-    Logger("Movella DOT", {"t_s": DOT_CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
+    Logger("Movella DOT", {"t_s": CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
     Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
     *(Logger("SensorLog", SENSORLOG | _axes("g", gyro), units={"force": "-g"}) for gyro in SENSORLOG_GYROS),
     Logger("SensorConnect", {"t_s": "Time"} | MSCL, _axes("m", "scaledMag{}"), {"force": "g"}),
@@ -129,6 +130,8 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units
+    if columns.get("t_s") == COUNTER and CLOCK in theirs and not any(map(COUNTS_HZ.search, above)):
+        columns["t_s"] = CLOCK
     counts_hz, period = _counter(columns.get("t_s"), above)
     names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     names = _renamed(theirs, columns) if columns else names
@@ -160,8 +163,8 @@ def _titles(text: str, above: list[str]) -> tuple[list[str], str]:
 
 def _counter(name: str | None, above: list[str]) -> tuple[float | None, int]:
     """Counts a second and period of a column that counts samples or ticks; (None, ...) for a column of times."""
-    if name == DOT_CLOCK and _has(above, DOT):
-        return DOT_CLOCK_HZ, DOT_CLOCK_PERIOD
+    if name == CLOCK:
+        return DOT_CLOCK_HZ if _has(above, DOT) else MT_CLOCK_HZ, CLOCK_PERIOD
     if name != COUNTER:
         return None, COUNTER_PERIOD
     rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]
@@ -183,7 +186,7 @@ def _recognised(theirs: list[str], above: list[str]) -> tuple[dict[str, str], di
             return logger.has | there, logger.units, (f"read as an export of {logger.name}",)
     if _has(above, DOT):
         raise ValueError(
-            f"an export of Movella DOT without {DOT_CLOCK}, {', '.join(XSENS.values())}: record in a mode that has them, as "
+            f"an export of Movella DOT without {CLOCK}, {', '.join(XSENS.values())}: record in a mode that has them, as "
             "rate quantities or custom mode 5 (FreeAcc is without gravity, which a track needs)"
         )
     return {}, {}, ()

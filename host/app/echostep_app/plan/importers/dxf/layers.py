@@ -44,6 +44,20 @@ BESIDE = (
     "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
     "*tile*", "*-iden*", "*-tag*", "*-symb*", "*-abov*", "*-ovhd*", "*-cntr*", "*-head*", "*achse*", "*tapete*", "*paper*", "*finish*",
 )  # fmt: skip
+# Of ways out, which are drawn like short walls
+EXITS = (
+    "*exit*",
+    "*egress*",
+    "*sortie*",
+    "*salida*",
+    "*saida*",
+    "*uscita*",
+    "*ausgang*",
+    "*uitgang*",
+    "*utgång*",
+    "*выход*",
+    "*出口*",
+)
 # Kinds whose layers come with layers of hatching or measures
 DRAWN = ("walls", "columns", "windows", "doors", "stairs", "lifts")
 THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed

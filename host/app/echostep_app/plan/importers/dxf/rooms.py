@@ -91,7 +91,7 @@ def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written]
         own = [name for name in left if outline.intersects(Point(name.room.at_m))]
         left = [name for name in left if name not in own]
         others = [text for text in texts if outline.intersects(Point(text.room.at_m))]
-        inside = [name.room for name in own] or _lines_of(others, report)
+        inside = [name.room for name in own] or _names_of(others, report)
         if inside or shapely.covers(outline, seen).sum() < 2:
             rooms.append(room(" ".join(name.name for name in inside)[:80], outline))
         seen.append(outline.representative_point())
@@ -139,19 +139,23 @@ def named_spaces(plan: Plan, level_index: int, texts: Sequence[Written], report:
         by_face.setdefault(spaces.face_at(*text.room.at_m), []).append(text)
     rooms = []
     for face, inside in sorted(by_face.items()):
-        if face != OUTSIDE and face not in spaces.hollow and (lines := _lines_of(inside, report)):
-            rooms.append(Room(" ".join(line.name for line in lines)[:80], lines[0].at_m))
+        if face != OUTSIDE and face not in spaces.hollow:
+            rooms += _names_of(inside, report)
     return rooms
 
 
-def _lines_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
-    """The lines of a room's name, from the top: its largest letters; measures are no names."""
+def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
+    """Names in a space, each of lines beneath each other: its largest letters; measures are no names."""
     words = [text for text in texts if not MEASURE.match(text.room.name)]
     largest = SAME_HEIGHT * max((text.height_m for text in words), default=0.0)
     lines = [text for text in words if text.height_m >= largest]
     for line in lines:
         report.take_back(line.what)
-    return sorted((line.room for line in lines), key=lambda one: (-one.at_m[1], one.at_m[0]))
+    names: list[list[Written]] = []
+    for line in sorted(lines, key=lambda one: (-one.room.at_m[1], one.room.at_m[0])):
+        above = [name for name in names if _follows(line, name[-1])]
+        (above[0] if above else names).append(line if above else [line])
+    return [Room(" ".join(line.room.name for line in name)[:80], name[0].room.at_m) for name in names]
 
 
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:

@@ -15,7 +15,7 @@ from typing import Any
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.entities import VisibleEntities, read_drawing
 from echostep_app.plan.importers.dxf.frame import METRES, DrawingFrame
-from echostep_app.plan.importers.dxf.layers import BESIDE, faces_m, matches, meaning, patterns_of
+from echostep_app.plan.importers.dxf.layers import BESIDE, EXITS, faces_m, matches, meaning, patterns_of
 from echostep_app.plan.importers.dxf.measures import lengths_of
 from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_unit
 from echostep_app.plan.importers.hints import Hints
@@ -106,7 +106,7 @@ def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:
     """Layers whose lines look like faces of walls, and their length (m), the longest first."""
     by_layer: dict[str, list[Any]] = {}
     for entity, layer in pairs:
-        if not matches(layer, BESIDE):
+        if not matches(layer, (*BESIDE, *EXITS)):
             by_layer.setdefault(layer, []).append(entity)
     lengths = {
         layer: faces_m([line for entity in entities for line in frame.raw(entity)])

@@ -90,6 +90,8 @@ def _why_empty(elements: Elements) -> str:
 def _without_level(elements: Elements, report: ImportReport) -> None:
     """Report indoor elements that no level tag places."""
     lost: dict[str, list[str]] = {}
+    unread = [tags["level"][:40] for _, _, tags in elements.lines() if tags.get("level") and not levels_of(tags)]
+    advice = f"level={unread[0]} is no number or range: write level=0;1 or level=0-2" if unread else "tag level=*"
     for where, _, tags in elements.lines():
         indoor = tags.get("indoor", "no")
         kind = "room" if indoor == "room" else f"indoor={indoor[:20]}" if indoor != "no" else ""
@@ -100,7 +102,7 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
         one = len(names) == 1
         report.doubt(
             f"{len(names)} {kind}{'' if one or kind == 'stairs' or '=' in kind else 's'} {'has' if one else 'have'} no level and "
-            f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): tag level=* and download it again"
+            f"{'was' if one else 'were'} left out ({', '.join(names[:5])}): {advice} and download it again"
         )
 
 

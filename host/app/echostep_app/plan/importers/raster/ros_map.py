@@ -48,6 +48,9 @@ def import_ros_map(path: Path, report: ImportReport) -> Plan:
         raise EchostepError(f"{path}: resolution: expected metres a pixel, more than 0")
     x, y, yaw = _origin(path, fields)
     picture = path.parent / fields["image"][:LONGEST_NAME]
+    if not picture.exists() and (beside := path.with_name(picture.name)).exists():
+        report.doubt(f"image: {picture} is not on this computer: {beside.name} beside it was taken")
+        picture = beside
     probability = _probability(path, fields, grey(picture, UNKNOWN))
     outlines, noise = trace(probability > _number(path, fields, "occupied_thresh", 1.0, OCCUPIED), picture)
     if not outlines:
