@@ -25,10 +25,13 @@ SOURCES = [
     *(FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c", "link.c", "status.c")),
 ]
 # On a board that does what the input says
-WHOLE = [ROOT / "tests/firmware/fuzz_firmware.c", *sorted(FIRMWARE.glob("*.c"))]
+WHOLE = [
+    *(ROOT / "tests/firmware" / name for name in ("fuzz_firmware.c", "stub_board.c")),
+    *sorted(FIRMWARE.glob("*.c")),
+]
 CORPUS = ROOT / "tests/firmware/corpus.txt"
 FOLDER = OUT / "fuzz"
-FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined"]
+FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-fsanitize=fuzzer,address,undefined"]
 LONGEST = (70, 600)  # bytes of an input, in turn by shard: a frame, as many as fuzz_codec.c takes
 WHOLE_LONGEST = (4000,)  # about a second of the board
 
