@@ -79,7 +79,7 @@ def received_case(line: int, name: str, vector: dict[str, Any]) -> str:
     code = f"""
 	memcpy(payload, {array(vector["frame"])}, {length});
 	n = frame_decode(payload, {length});
-	hold({line}, n == MSG_{name.upper()}_SIZE && payload[0] == MSG_{name.upper()});"""
+	hold({line}, n >= 0 && n <= MSG_{name.upper()}_SIZE && payload[0] == MSG_{name.upper()});"""
     if not vector["fields"]:
         return code
     fields = " ".join(f"hold({line}, m.{field} == {value});" for field, value in vector["fields"].items())

@@ -229,7 +229,7 @@ def test_a_vibration_faster_than_the_samples_is_filtered(imus: Bench) -> None:
 
 
 def test_lsm6dso_test_themselves_at_the_start(imus: Bench) -> None:
-    newest = {x.gyro: x for x in imus.messages if isinstance(x, m.GyroHealth)}
+    newest = imus.reports.gyros
     assert {x.self_test for x in newest.values()} == {m.SelfTest.PASSED}
     assert all(615 <= -x.response_st1 <= 2_870 and 615 <= x.response_st2 <= 2_870 for x in newest.values())
     assert all(abs(gyro_celsius(x) - 20.0) < 0.2 for x in newest.values())

@@ -201,11 +201,6 @@ def cause(bench: Bench) -> int:
     return next(x for x in reversed(bench.messages) if isinstance(x, m.Identity)).reset_cause
 
 
-def self_tests(bench: Bench) -> set[int]:
-    """The newest self-test of each gyro."""
-    return set({x.gyro: x.self_test for x in bench.messages if isinstance(x, m.GyroHealth)}.values())
-
-
 def traced(bench: Bench, word: str) -> list[str]:
     """What follows this word in the traces."""
     return [text.removeprefix(word).strip() for _, text in bench.board.trace if text.startswith(word)]
@@ -225,7 +220,7 @@ def test_a_crash_costs_a_quarter_of_a_second_and_says_where_it_was(bench: Bench)
     assert cause(bench) == m.ResetCause.WATCHDOG
     assert longest_gap_s(bench) < 0.25
     assert not any(-32768 in g[1:] for g in found if isinstance(g, m.Gyros))
-    assert self_tests(bench) == {m.SelfTest.NOT_RUN}
+    assert {x.self_test for x in bench.reports.gyros.values()} == {m.SelfTest.NOT_RUN}
     health = subscribe(bench)
     assert (health.starts, health.crashes, health.crash_place) == (2, 1, m.CrashPlace.SLEEP)
     assert [f"{health.crash_address:04x}"] == traced(bench, "hang")
@@ -248,7 +243,7 @@ def test_the_reset_button_costs_the_bootloaders_wait_and_a_self_test(bench: Benc
     assert bench.run(BOOTLOADER_MS - 10) == []
     bench.run(2_000)
     assert cause(bench) == m.ResetCause.EXTERNAL
-    assert self_tests(bench) == {m.SelfTest.PASSED}
+    assert {x.self_test for x in bench.reports.gyros.values()} == {m.SelfTest.PASSED}
     assert subscribe(bench).crashes == 0
 
 
@@ -262,7 +257,7 @@ def test_a_brown_out_is_told_from_the_button(bench: Bench, fuse: str, low_mv: in
     bench.run(BOOTLOADER_MS + 2_000)
     assert traced(bench, "reset") == ["power", "brown_out"]
     assert cause(bench) == m.ResetCause.BROWN_OUT
-    assert self_tests(bench) == {m.SelfTest.NOT_RUN}
+    assert {x.self_test for x in bench.reports.gyros.values()} == {m.SelfTest.NOT_RUN}
 
 
 def test_below_the_stock_fuse_the_processor_may_hang_and_is_restarted(bench: Bench) -> None:
