@@ -137,14 +137,3 @@ def test_a_host_that_asks_for_other_sensors_gets_none(foot: Bench) -> None:
     found = run(foot, 1_000)
     assert next(x for x in found if isinstance(x, m.Configuration)).sensors == 0
     assert not kinds(found)["Ping"] + kinds(found)["Gyros"]
-
-
-@pytest.mark.parametrize("kit", ["papers", "2026"])
-def test_a_belt_board_is_none(bench: Bench, kit: str) -> None:
-    bench.fault(f"kit={kit}")
-    bench.subscribe()
-    found = bench.run(3_000)
-    assert not kinds(found)["Foot"] + kinds(found)["FootHealth"]
-    parts = next(x for x in reversed(found) if isinstance(x, m.Parts))
-    assert (parts.part_foot, parts.identity_foot) == (m.Part.NONE, 0)
-    assert kinds(found)["Ping"] >= 80

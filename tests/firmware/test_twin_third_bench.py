@@ -60,6 +60,16 @@ def test_no_wrong_sample_of_a_belt_board_reaches_the_host(bench: Bench, errors: 
     assert [text for text in findings_of(bench) if "sent wrong bits" in text]
 
 
+@pytest.mark.parametrize("errors", [3, 10])
+def test_no_wrong_field_reaches_the_host(bench: Bench, errors: int) -> None:
+    """P1, on I2C: the compass is read twice."""
+    begin(bench, "kit=2026")
+    bench.fault(f"twi_errors={errors}")
+    found = [x for _ in range(6) for x in bench.run(5_000, rows(5_000))]
+    assert wrong_values(found) == []
+    assert kinds(found)["Magnetic"] > 280 - 5 * errors
+
+
 @pytest.mark.parametrize("value", [0x01, 0x20])
 def test_a_reserved_register_may_read_anything(bench: Bench, value: int) -> None:
     """P2: register 0x1F of an LSM6DSO; three good parts had no rates."""
