@@ -15,7 +15,6 @@
 #define NS_PER_TICK 500
 #define RANGING_TICKS (61u * TICKS_PER_MS)
 #define SYNC_TICKS (10u * TICKS_PER_MS)
-#define RANGE_COMMAND_LENGTH 2u
 
 static int terminal;
 static bool is_open, was_opened;
@@ -100,7 +99,7 @@ bool twi_begin(struct twi_transfer *t)
 		t->state = TWI_DONE;
 		if (t->write_length)
 			parts[k].pointer = t->bytes[0];
-		if (t->write_length == RANGE_COMMAND_LENGTH)
+		if (t->write_length == 2) /* a command */
 			parts[k].busy_until = t->ticks + RANGING_TICKS;
 		for (uint8_t n = 0; n < t->read_length; n++) {
 			uint8_t at = parts[k].pointer++;
