@@ -51,7 +51,7 @@ static void seek_on(enum twi_state bus, uint32_t now)
 	} else {
 		state = !done ? SEEK_FIRST : state == START_FIRST ? START_SECOND : READS_LIS3MDL;
 		due = state == READS_LIS3MDL ? now + FIRST_SAMPLE_TICKS : due;
-		check_due = now + CHECK_TICKS;
+		check_due = now;
 	}
 }
 
@@ -81,7 +81,10 @@ static void finish(enum twi_state bus, uint32_t now)
 	}
 	if (fault == FAULT_NONE)
 		fault = state == READS_LIS3MDL ? lis3mdl_finish(&transfer) : cmps10_finish(&transfer);
-	note(fault, now);
+	if (fault == LIS3MDL_AGAIN)
+		due -= period; /* at once */
+	else
+		note(fault, now);
 }
 
 static void prepare(uint32_t now)

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lis3mdl.h"
-#include "link.h"  /* sending the messages */
-#include "parts.h" /* what was found */
+#include <string.h> /* memcmp */
+#include "link.h"   /* sending the messages */
+#include "parts.h"  /* what was found */
 
 /* Registers and values [LIS3MDL data sheet, chapters 6 and 7]. */
 #define ADDRESS_LOW 0x1Cu  /* SA1 low */
@@ -19,6 +20,7 @@
 #define CTRL_REG5_WHOLE_SAMPLES 0x40u
 #define STATUS_READY 0x08u
 #define SAMPLE_LENGTH 7u
+#define READINGS_MAX 4u /* of a sample, which has no checksum, until two that follow each other are equal */
 
 static const uint8_t steps[][6] FLASH = { /* bytes to write, bytes to read, the bytes */
 	[LIS3MDL_IDENTITY] = { 1, 1, REGISTER_WHO_AM_I },
@@ -65,9 +67,17 @@ static int16_t word(const uint8_t *bytes)
 
 uint8_t lis3mdl_finish(const struct twi_transfer *transfer)
 {
+	static uint8_t before[SAMPLE_LENGTH - 1u], readings;
 	const uint8_t *b = transfer->bytes;
-	if (!(b[0] & STATUS_READY))
+	bool first = !readings, equal = !first && memcmp(before, b + 1, sizeof before) == 0;
+	if (first && !(b[0] & STATUS_READY))
 		return FAULT_NEVER_READY;
+	memcpy(before, b + 1, sizeof before);
+	if (!equal && ++readings < READINGS_MAX)
+		return LIS3MDL_AGAIN;
+	readings = 0;
+	if (!equal)
+		return FAULT_BAD_VALUE;
 	struct msg_magnetic m = { transfer->ticks, word(b + 1), word(b + 3), word(b + 5) };
 	if (link_wants(REPORTS_MAGNETIC))
 		link_send(MSG_MAGNETIC, msg_pack_magnetic(link_body(), &m));

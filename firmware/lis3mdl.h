@@ -18,7 +18,10 @@ bool lis3mdl_answers(const struct twi_transfer *transfer);
 /* Whether a finished transfer of LIS3MDL_CHECK has read all settings as written. */
 bool lis3mdl_is_set(const struct twi_transfer *transfer);
 
-/* Sends the field of a finished transfer of LIS3MDL_SAMPLE to a host that wants it; returns FAULT_*. */
+#define LIS3MDL_AGAIN 0xFFu
+
+/* Sends the field of a finished transfer of LIS3MDL_SAMPLE to a host that wants it, if it is as the one before; returns
+ * FAULT_*, or LIS3MDL_AGAIN: one more is needed. */
 uint8_t lis3mdl_finish(const struct twi_transfer *transfer);
 
 #endif

@@ -30,12 +30,12 @@ static void send_identity(void)
 static void send_configuration(void)
 {
 	struct msg_configuration m = {
-		clock_now(),
-		configuration.sensors,
-		configuration.schedule,
-		configuration.gyro_rate_hz,
-		configuration.compass_rate_hz,
-		configuration.pressure_mode,
+		.ticks = clock_now(),
+		.sensors = configuration.sensors,
+		.schedule = configuration.schedule,
+		.gyro_rate_hz = configuration.gyro_rate_hz,
+		.compass_rate_hz = configuration.compass_rate_hz,
+		.pressure_mode = configuration.pressure_mode,
 	};
 	link_send(MSG_CONFIGURATION, msg_pack_configuration(link_body(), &m));
 }

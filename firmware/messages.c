@@ -12,7 +12,8 @@ static uint16_t get16(const uint8_t *in)
 #error the messages are copied with their least byte first
 #endif
 
-/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero. Returns the bytes. */
+/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero and the bytes of the fields
+ * that were added, whose zeros at the end stay away. Returns the bytes. */
 static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 {
 	const uint8_t *in = m;
@@ -24,34 +25,36 @@ static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 		while (size--)
 			out[length++] = in[at++];
 	}
+	for (size = flash_byte(sizes); size && !out[length - 1]; size--)
+		length--;
 	return length;
 }
 
-#define PACKED(message, ...) \
+#define PACKED(message, added, ...) \
 	uint8_t msg_pack_##message(uint8_t *out, const struct msg_##message *m) \
 	{ \
-		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0 }; \
+		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0, added }; \
 		return pack(out, m, sizes); \
 	}
 
-PACKED(identity, 4, 4, 1, 1, 1, 1)
-PACKED(ping, 4, 1, 1, 2)
-PACKED(gyros, 4, 2, 2, 2)
-PACKED(pressure, 4, 4, 2)
-PACKED(compass, 4, 2)
-PACKED(sync, 4, 2)
-PACKED(status, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 2)
-PACKED(clock_reply, 4, 2)
-PACKED(configuration, 4, 1, 1, 1, 1, 1)
-PACKED(gyro_health, 4, 1, 2, 1, 2, 2)
-PACKED(board_health, 4, 2, 2, 1, 1, 1, 2, 1)
-PACKED(parts, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1)
-PACKED(motion, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2)
-PACKED(magnetic, 4, 2, 2, 2)
-PACKED(foot, 4, 2, 2, 2, 2, 2, 2, 2)
-PACKED(foot_health, 4, 1, 1, 2, 2, 2)
-PACKED(electrical, 4, 1, 1, 1, 1, 1, 1)
-PACKED(loop, 4, 2, 2, 2)
+PACKED(identity, 0, 4, 4, 1, 1, 1, 1)
+PACKED(ping, 0, 4, 1, 1, 2)
+PACKED(gyros, 0, 4, 2, 2, 2)
+PACKED(pressure, 0, 4, 4, 2)
+PACKED(compass, 0, 4, 2)
+PACKED(sync, 0, 4, 2)
+PACKED(status, 1, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 2, 1)
+PACKED(clock_reply, 0, 4, 2)
+PACKED(configuration, 1, 4, 1, 1, 1, 1, 1, 1)
+PACKED(gyro_health, 0, 4, 1, 2, 1, 2, 2)
+PACKED(board_health, 0, 4, 2, 2, 1, 1, 1, 2, 1)
+PACKED(parts, 0, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1)
+PACKED(motion, 0, 4, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2)
+PACKED(magnetic, 0, 4, 2, 2, 2)
+PACKED(foot, 0, 4, 2, 2, 2, 2, 2, 2, 2)
+PACKED(foot_health, 0, 4, 1, 1, 2, 2, 2)
+PACKED(electrical, 0, 4, 1, 1, 1, 1, 1, 1)
+PACKED(loop, 0, 4, 2, 2, 2)
 
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length)
 {
@@ -63,20 +66,22 @@ bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_
 
 bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length)
 {
-	if (length != MSG_CONFIGURE_SIZE)
+	if (length < 5 || length > MSG_CONFIGURE_SIZE)
 		return false;
 	m->sensors = in[0];
 	m->schedule = in[1];
 	m->gyro_rate_hz = in[2];
 	m->compass_rate_hz = in[3];
 	m->pressure_mode = in[4];
+	m->more_sensors = length > 5 ? in[5] : 0;
 	return true;
 }
 
 bool msg_unpack_subscribe(struct msg_subscribe *m, const uint8_t *in, uint8_t length)
 {
-	if (length != MSG_SUBSCRIBE_SIZE)
+	if (length < 1 || length > MSG_SUBSCRIBE_SIZE)
 		return false;
 	m->reports = in[0];
+	m->more_reports = length > 1 ? in[1] : 0;
 	return true;
 }

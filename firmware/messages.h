@@ -9,7 +9,7 @@
 #define SCHEMA_HASH 0x79028015ul
 #define SCHEMA_SEED 0xF917u
 #define IDENTITY_SEED 0xFFFFu
-#define MSG_MAX_SIZE 44u /* longest body */
+#define MSG_MAX_SIZE 45u /* longest body */
 
 /* What a field holds when nothing was measured. */
 #define MSG_PING_TIME_OF_FLIGHT_US_INVALID ((uint16_t)0)
@@ -29,8 +29,8 @@ enum { MSG_IDENTITY = 0x01, MSG_PING = 0x02, MSG_GYROS = 0x03, MSG_PRESSURE = 0x
 	MSG_BOARD_HEALTH = 0x0B, MSG_PARTS = 0x0C, MSG_MOTION = 0x0D, MSG_MAGNETIC = 0x0E, MSG_FOOT = 0x0F,
 	MSG_FOOT_HEALTH = 0x10, MSG_ELECTRICAL = 0x11, MSG_LOOP = 0x12, MSG_IDENTIFY = 0x81, MSG_CLOCK_QUERY = 0x82,
 	MSG_CONFIGURE = 0x83, MSG_CHECK_GYROS = 0x84, MSG_SUBSCRIBE = 0x85 };
-enum { MSG_IDENTIFY_SIZE = 0, MSG_CLOCK_QUERY_SIZE = 2, MSG_CONFIGURE_SIZE = 5, MSG_CHECK_GYROS_SIZE = 0,
-	MSG_SUBSCRIBE_SIZE = 1 };
+enum { MSG_IDENTIFY_SIZE = 0, MSG_CLOCK_QUERY_SIZE = 2, MSG_CONFIGURE_SIZE = 6, MSG_CHECK_GYROS_SIZE = 0,
+	MSG_SUBSCRIBE_SIZE = 2 };
 enum { RESET_CAUSE_POWER_ON = 1, RESET_CAUSE_EXTERNAL = 2, RESET_CAUSE_BROWN_OUT = 4, RESET_CAUSE_WATCHDOG = 8,
 	RESET_CAUSE_JTAG = 16, RESET_CAUSE_USB = 32 };
 enum { RANGER_LEFT = 0, RANGER_RIGHT = 1 };
@@ -59,26 +59,20 @@ enum { REPORTS_BOARD_HEALTH = 1, REPORTS_PARTS = 2, REPORTS_MOTION = 4, REPORTS_
 struct msg_identity {
 	uint32_t ticks; /* 0.5 us */
 	uint32_t schema_hash;
-	uint8_t version_major;
-	uint8_t version_minor;
-	uint8_t version_patch;
-	uint8_t reset_cause;
+	uint8_t version_major, version_minor, version_patch, reset_cause;
 };
 uint8_t msg_pack_identity(uint8_t *out, const struct msg_identity *m);
 
 struct msg_ping {
 	uint32_t ticks; /* 0.5 us */
-	uint8_t ranger;
-	uint8_t outcome;
+	uint8_t ranger, outcome;
 	uint16_t time_of_flight_us; /* us, 0: invalid */
 };
 uint8_t msg_pack_ping(uint8_t *out, const struct msg_ping *m);
 
 struct msg_gyros {
 	uint32_t ticks; /* 0.5 us */
-	int16_t thigh; /* 0.2439 deg/s, -32768: invalid */
-	int16_t calf; /* 0.2439 deg/s, -32768: invalid */
-	int16_t belt; /* 0.2439 deg/s, -32768: invalid */
+	int16_t thigh, calf, belt; /* 0.2439 deg/s, -32768: invalid */
 };
 uint8_t msg_pack_gyros(uint8_t *out, const struct msg_gyros *m);
 
@@ -103,30 +97,14 @@ uint8_t msg_pack_sync(uint8_t *out, const struct msg_sync *m);
 
 struct msg_status {
 	uint32_t ticks; /* 0.5 us */
-	uint16_t dropped_ping;
-	uint16_t dropped_gyros;
-	uint16_t dropped_pressure;
-	uint16_t dropped_compass;
-	uint16_t dropped_sync;
-	uint16_t dropped_other;
-	uint16_t errors_ranger_left;
-	uint16_t errors_ranger_right;
-	uint16_t errors_compass;
-	uint16_t errors_thigh;
-	uint16_t errors_calf;
-	uint16_t errors_belt;
-	uint16_t errors_pressure;
-	uint16_t bus_recoveries;
-	uint16_t bad_frames;
-	uint8_t fault_ranger_left;
-	uint8_t fault_ranger_right;
-	uint8_t fault_compass;
-	uint8_t fault_thigh;
-	uint8_t fault_calf;
-	uint8_t fault_belt;
-	uint8_t fault_pressure;
-	uint8_t healthy;
+	uint16_t dropped_ping, dropped_gyros, dropped_pressure,
+		dropped_compass, dropped_sync, dropped_other, errors_ranger_left,
+		errors_ranger_right, errors_compass, errors_thigh, errors_calf,
+		errors_belt, errors_pressure, bus_recoveries, bad_frames;
+	uint8_t fault_ranger_left, fault_ranger_right, fault_compass,
+		fault_thigh, fault_calf, fault_belt, fault_pressure, healthy;
 	uint16_t memory_used; /* byte */
+	uint8_t more_healthy;
 };
 uint8_t msg_pack_status(uint8_t *out, const struct msg_status *m);
 
@@ -138,11 +116,9 @@ uint8_t msg_pack_clock_reply(uint8_t *out, const struct msg_clock_reply *m);
 
 struct msg_configuration {
 	uint32_t ticks; /* 0.5 us */
-	uint8_t sensors;
-	uint8_t schedule;
-	uint8_t gyro_rate_hz; /* Hz */
-	uint8_t compass_rate_hz; /* Hz */
-	uint8_t pressure_mode;
+	uint8_t sensors, schedule;
+	uint8_t gyro_rate_hz, compass_rate_hz; /* Hz */
+	uint8_t pressure_mode, more_sensors;
 };
 uint8_t msg_pack_configuration(uint8_t *out, const struct msg_configuration *m);
 
@@ -151,18 +127,14 @@ struct msg_gyro_health {
 	uint8_t gyro;
 	int16_t temperature; /* 0.1453 degC, -32768: invalid */
 	uint8_t self_test;
-	int16_t response_st1; /* 0.2439 deg/s, -32768: invalid */
-	int16_t response_st2; /* 0.2439 deg/s, -32768: invalid */
+	int16_t response_st1, response_st2; /* 0.2439 deg/s, -32768: invalid */
 };
 uint8_t msg_pack_gyro_health(uint8_t *out, const struct msg_gyro_health *m);
 
 struct msg_board_health {
 	uint32_t ticks; /* 0.5 us */
-	uint16_t supply_mv; /* mV, 0: invalid */
-	uint16_t supply_least_mv; /* mV, 0: invalid */
-	uint8_t starts;
-	uint8_t crashes;
-	uint8_t crash_place;
+	uint16_t supply_mv, supply_least_mv; /* mV, 0: invalid */
+	uint8_t starts, crashes, crash_place;
 	uint16_t crash_address; /* word */
 	uint8_t suspends;
 };
@@ -170,94 +142,59 @@ uint8_t msg_pack_board_health(uint8_t *out, const struct msg_board_health *m);
 
 struct msg_parts {
 	uint32_t ticks; /* 0.5 us */
-	uint8_t part_ranger_left;
-	uint8_t part_ranger_right;
-	uint8_t part_compass;
-	uint8_t part_thigh;
-	uint8_t part_calf;
-	uint8_t part_belt;
-	uint8_t part_pressure;
-	uint8_t part_foot;
-	uint8_t identity_ranger_left;
-	uint8_t identity_ranger_right;
-	uint8_t identity_compass;
-	uint8_t identity_thigh;
-	uint8_t identity_calf;
-	uint8_t identity_belt;
-	uint8_t identity_pressure;
-	uint8_t identity_foot;
-	uint8_t wiring;
+	uint8_t part_ranger_left, part_ranger_right, part_compass,
+		part_thigh, part_calf, part_belt, part_pressure, part_foot,
+		identity_ranger_left, identity_ranger_right, identity_compass,
+		identity_thigh, identity_calf, identity_belt, identity_pressure,
+		identity_foot, wiring;
 };
 uint8_t msg_pack_parts(uint8_t *out, const struct msg_parts *m);
 
 struct msg_motion {
 	uint32_t ticks; /* 0.5 us */
-	int16_t thigh_rate_x; /* 0.035 deg/s, -32768: invalid */
-	int16_t thigh_rate_y; /* 0.035 deg/s, -32768: invalid */
-	int16_t thigh_rate_z; /* 0.035 deg/s, -32768: invalid */
-	int16_t thigh_acceleration_x; /* 0.244 mg, -32768: invalid */
-	int16_t thigh_acceleration_y; /* 0.244 mg, -32768: invalid */
-	int16_t thigh_acceleration_z; /* 0.244 mg, -32768: invalid */
-	int16_t calf_rate_x; /* 0.035 deg/s, -32768: invalid */
-	int16_t calf_rate_y; /* 0.035 deg/s, -32768: invalid */
-	int16_t calf_rate_z; /* 0.035 deg/s, -32768: invalid */
-	int16_t calf_acceleration_x; /* 0.244 mg, -32768: invalid */
-	int16_t calf_acceleration_y; /* 0.244 mg, -32768: invalid */
-	int16_t calf_acceleration_z; /* 0.244 mg, -32768: invalid */
-	int16_t belt_rate_x; /* 0.035 deg/s, -32768: invalid */
-	int16_t belt_rate_y; /* 0.035 deg/s, -32768: invalid */
-	int16_t belt_rate_z; /* 0.035 deg/s, -32768: invalid */
-	int16_t belt_acceleration_x; /* 0.244 mg, -32768: invalid */
-	int16_t belt_acceleration_y; /* 0.244 mg, -32768: invalid */
-	int16_t belt_acceleration_z; /* 0.244 mg, -32768: invalid */
+	int16_t thigh_rate_x, thigh_rate_y, thigh_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t thigh_acceleration_x, thigh_acceleration_y,
+		thigh_acceleration_z; /* 0.244 mg, -32768: invalid */
+	int16_t calf_rate_x, calf_rate_y, calf_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t calf_acceleration_x, calf_acceleration_y,
+		calf_acceleration_z; /* 0.244 mg, -32768: invalid */
+	int16_t belt_rate_x, belt_rate_y, belt_rate_z; /* 0.035 deg/s, -32768: invalid */
+	int16_t belt_acceleration_x, belt_acceleration_y,
+		belt_acceleration_z; /* 0.244 mg, -32768: invalid */
 };
 uint8_t msg_pack_motion(uint8_t *out, const struct msg_motion *m);
 
 struct msg_magnetic {
 	uint32_t ticks; /* 0.5 us */
-	int16_t x; /* 1/6842 gauss, -32768: invalid */
-	int16_t y; /* 1/6842 gauss, -32768: invalid */
-	int16_t z; /* 1/6842 gauss, -32768: invalid */
+	int16_t x, y, z; /* 1/6842 gauss, -32768: invalid */
 };
 uint8_t msg_pack_magnetic(uint8_t *out, const struct msg_magnetic *m);
 
 struct msg_foot {
 	uint32_t ticks; /* 0.5 us */
 	uint16_t sample;
-	int16_t rate_x; /* 1/8.2 deg/s */
-	int16_t rate_y; /* 1/8.2 deg/s */
-	int16_t rate_z; /* 1/8.2 deg/s */
-	int16_t acceleration_x; /* 1/1024 g */
-	int16_t acceleration_y; /* 1/1024 g */
-	int16_t acceleration_z; /* 1/1024 g */
+	int16_t rate_x, rate_y, rate_z; /* 1/8.2 deg/s */
+	int16_t acceleration_x, acceleration_y, acceleration_z; /* 1/1024 g */
 };
 uint8_t msg_pack_foot(uint8_t *out, const struct msg_foot *m);
 
 struct msg_foot_health {
 	uint32_t ticks; /* 0.5 us */
-	uint8_t foot_state;
-	uint8_t fault;
-	uint16_t errors;
-	uint16_t missed;
+	uint8_t foot_state, fault;
+	uint16_t errors, missed;
 	int16_t temperature; /* 1/333.87 degC, -32768: invalid */
 };
 uint8_t msg_pack_foot_health(uint8_t *out, const struct msg_foot_health *m);
 
 struct msg_electrical {
 	uint32_t ticks; /* 0.5 us */
-	uint8_t readings;
-	uint8_t miso_ones;
-	uint8_t d4_ones;
-	uint8_t d13_ones;
-	uint8_t sda_ones;
-	uint8_t scl_ones;
+	uint8_t readings, miso_ones, d4_ones, d13_ones, sda_ones, scl_ones;
 };
 uint8_t msg_pack_electrical(uint8_t *out, const struct msg_electrical *m);
 
 struct msg_loop {
 	uint32_t ticks; /* 0.5 us */
-	uint16_t longest_turn; /* 0.5 us */
-	uint16_t longest_latency; /* 0.5 us */
+	uint16_t longest_turn, longest_latency; /* 0.5 us */
 	uint16_t ranging_cycle; /* 4 us, 0: invalid */
 };
 uint8_t msg_pack_loop(uint8_t *out, const struct msg_loop *m);
@@ -268,16 +205,14 @@ struct msg_clock_query {
 bool msg_unpack_clock_query(struct msg_clock_query *m, const uint8_t *in, uint8_t length);
 
 struct msg_configure {
-	uint8_t sensors;
-	uint8_t schedule;
-	uint8_t gyro_rate_hz; /* Hz */
-	uint8_t compass_rate_hz; /* Hz */
-	uint8_t pressure_mode;
+	uint8_t sensors, schedule;
+	uint8_t gyro_rate_hz, compass_rate_hz; /* Hz */
+	uint8_t pressure_mode, more_sensors;
 };
 bool msg_unpack_configure(struct msg_configure *m, const uint8_t *in, uint8_t length);
 
 struct msg_subscribe {
-	uint8_t reports;
+	uint8_t reports, more_reports;
 };
 bool msg_unpack_subscribe(struct msg_subscribe *m, const uint8_t *in, uint8_t length);
 

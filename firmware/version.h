@@ -5,6 +5,6 @@
 
 #define VERSION_MAJOR 1
 #define VERSION_MINOR 9 /* one digit */
-#define VERSION_PATCH 0 /* one digit */
+#define VERSION_PATCH 1 /* one digit */
 
 #endif

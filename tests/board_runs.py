@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
-from echostep.board.reports import SUBSCRIBE
+from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.stimulus import NO_SYNC, ROW
 from layers import needs
@@ -73,14 +74,23 @@ class Bench:
         self.board.send(encode(message, self.asked))
         self.asked += 1
 
-    def subscribe(self) -> None:
+    def subscribe(self, rows: Callable[[int], NDArray[Any]] = quiet_rows) -> None:
         """Ask the board for its optional messages, once it has started."""
-        self.run(300)
+        self.run(300, rows(300))
         self.ask(SUBSCRIBE)
 
-    def fault(self, text: str) -> None:
-        """Throw a fault switch."""
-        self.board.fault(text)
+    def fault(self, *switches: str) -> None:
+        """Throw fault switches."""
+        for switch in switches:
+            self.board.fault(switch)
+
+    @property
+    def reports(self) -> BoardReports:
+        """What the host keeps of all messages so far."""
+        kept = BoardReports()
+        for message in self.messages:
+            kept.add(message)
+        return kept
 
     @property
     def status(self) -> m.Status:

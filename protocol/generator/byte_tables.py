@@ -36,7 +36,8 @@ def _tables(messages: list[Message]) -> str:
 
 
 def _table(message: Message) -> list[str]:
-    title = f"### `0x{message.id:02X}` {message.name} ({SENDERS[message.direction]}, body {message.size} B)"
+    size = f"{message.least} to {message.size}" if message.least < message.size else message.size
+    title = f"### `0x{message.id:02X}` {message.name} ({SENDERS[message.direction]}, body {size} B)"
     lines = [title, "", message.doc, ""]
     if not message.fields:
         return lines

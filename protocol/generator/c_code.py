@@ -7,7 +7,8 @@ In: the messages between board and host. Out: C11 source. Owns nothing.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 
 from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
@@ -59,13 +60,17 @@ def _declaration(message: Message) -> list[str]:
     """Struct and function of one message."""
     if not message.fields:
         return []
-    lines = ["", f"struct msg_{message.name} {{", *(_member(field) for field in message.fields), "};"]
+    lines = ["", f"struct msg_{message.name} {{", *_members(message.fields), "};"]
     return [*lines, f"{_signature(message)};"]
 
 
-def _member(field: Field) -> str:
-    notes = ", ".join(n for n in (field.unit, "" if field.invalid is None else f"{field.invalid}: invalid") if n)
-    return f"\t{field.wire.c_name} {field.name};" + (f" /* {notes} */" if notes else "")
+def _members(fields: Iterable[Field]) -> Iterator[str]:
+    """Neighbours of one type, unit and invalid value in one declaration."""
+    for (c_name, unit, invalid), alike in groupby(fields, lambda field: (field.wire.c_name, field.unit, field.invalid)):
+        notes = ", ".join(n for n in (unit, "" if invalid is None else f"{invalid}: invalid") if n)
+        text = f"{c_name} {', '.join(field.name for field in alike)};"
+        lines = textwrap.wrap(text, COMMENT_WIDTH - 50, initial_indent="\t", subsequent_indent="\t\t")
+        yield "\n".join(lines) + (f" /* {notes} */" if notes else "")
 
 
 def _signature(message: Message) -> str:
@@ -80,7 +85,8 @@ PACK = """
 #error the messages are copied with their least byte first
 #endif
 
-/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero. Returns the bytes. */
+/* Copies a struct without what lies between its fields; `sizes`: of each field, then a zero and the bytes of the fields
+ * that were added, whose zeros at the end stay away. Returns the bytes. */
 static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 {
 	const uint8_t *in = m;
@@ -92,13 +98,15 @@ static uint8_t pack(uint8_t *out, const void *m, const uint8_t *sizes)
 		while (size--)
 			out[length++] = in[at++];
 	}
+	for (size = flash_byte(sizes); size && !out[length - 1]; size--)
+		length--;
 	return length;
 }
 
-#define PACKED(message, ...) \\
+#define PACKED(message, added, ...) \\
 	uint8_t msg_pack_##message(uint8_t *out, const struct msg_##message *m) \\
 	{ \\
-		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0 }; \\
+		static const uint8_t sizes[] FLASH = { __VA_ARGS__, 0, added }; \\
 		return pack(out, m, sizes); \\
 	}
 
@@ -123,14 +131,18 @@ def c_code(messages: list[Message]) -> str:
 
 
 def _packed(message: Message) -> str:
-    sizes = "".join(f", {field.size}" for field in message.fields)
-    return "\n\t".join(textwrap.wrap(f"PACKED({message.name}{sizes})", COMMENT_WIDTH - 8)) + "\n"
+    sizes = ", ".join(str(size) for size in (message.size - message.least, *(field.size for field in message.fields)))
+    return "\n\t".join(textwrap.wrap(f"PACKED({message.name}, {sizes})", COMMENT_WIDTH - 8)) + "\n"
 
 
 def _unpack(message: Message) -> list[str]:
-    lines = [f"\tif (length != MSG_{message.name.upper()}_SIZE)", "\t\treturn false;"]
+    size = f"MSG_{message.name.upper()}_SIZE"
+    wrong = f"length != {size}" if message.least == message.size else f"length < {message.least} || length > {size}"
+    lines = [f"\tif ({wrong})", "\t\treturn false;"]
     for field, offset in zip(message.fields, message.offsets, strict=True):
-        if field.type == "u8":
+        if field.added:
+            lines.append(f"\tm->{field.name} = length > {offset} ? in[{offset}] : 0;")
+        elif field.type == "u8":
             lines.append(f"\tm->{field.name} = in[{offset}];")
         elif field.type == "u16":
             lines.append(f"\tm->{field.name} = get16(in + {offset});")

@@ -14,7 +14,8 @@ def python_code(messages: list[Message]) -> str:
     lines = _head(schema_hash(messages)) + _enumerations(messages)
     for message in messages:
         lines += _message(message)
-    return "\n".join(lines + _union(messages) + _by_id(messages) + _rows(messages) + _greatest(messages)) + "\n"
+    tables = _by_id(messages) + _rows(messages) + _least(messages) + _greatest(messages)
+    return "\n".join(lines + _union(messages) + tables) + "\n"
 
 
 def _head(value: int) -> list[str]:
@@ -37,6 +38,11 @@ def _head(value: int) -> list[str]:
         f"SCHEMA_HASH = 0x{value:08X}",
         f"SCHEMA_SEED = 0x{crc_seed(value):04X}",
         f"FIXED_SEED = 0x{FIXED_SEED:04X}",
+        "",
+        "",
+        "def _trimmed(body: bytes, least: int) -> bytes:",
+        '    """A body without the zeros at the end of the fields that were added."""',
+        '    return body[:least] + body[least:].rstrip(b"\\0")',
         "",
     ]
 
@@ -67,10 +73,15 @@ def _message(message: Message) -> list[str]:
 
 def _declaration(field: Field) -> str:
     notes = [n for n in (field.unit, "" if field.invalid is None else f"{field.invalid} = invalid") if n]
-    return f"    {field.name}: int" + (f"  # {', '.join(notes)}" if notes else "")
+    default = " = 0" if field.added else ""
+    return f"    {field.name}: int{default}" + (f"  # {', '.join(notes)}" if notes else "")
 
 
 def _methods(message: Message, codec: str) -> list[str]:
+    packed, size, wrong = f"{codec}.pack(*self)", str(message.size), f"len(body) != {message.size}"
+    if message.least < message.size:
+        packed, wrong = f"_trimmed({packed}, {message.least})", f"not {message.least} <= len(body) <= {message.size}"
+        size = f"{message.least} to {message.size}"
     return [
         "    @property",
         "    def id(self) -> int:",
@@ -78,13 +89,13 @@ def _methods(message: Message, codec: str) -> list[str]:
         "",
         "    def pack(self) -> bytes:",
         '        """Bytes of the body; raises struct.error when a value does not fit its type."""',
-        f"        return {codec}.pack(*self)",
+        f"        return {packed}",
         "",
         "    @classmethod",
         f"    def unpack(cls, body: bytes) -> {_camel(message.name)}:",
         '        """Values of a body; raises ValueError when length or an enumeration is wrong."""',
-        f"        if len(body) != {message.size}:",
-        f'            raise ValueError(f"{message.name}: {{len(body)}} bytes, expected {message.size}")',
+        f"        if {wrong}:",
+        f'            raise ValueError(f"{message.name}: {{len(body)}} bytes, expected {size}")',
         *_unpack_values(message, codec),
         "",
     ]
@@ -92,9 +103,10 @@ def _methods(message: Message, codec: str) -> list[str]:
 
 def _unpack_values(message: Message, codec: str) -> list[str]:
     enums = [f for f in message.fields if f.enum]
+    body = "body" if message.least == message.size else f'body.ljust({message.size}, b"\\0")'
     if not enums:
-        return [f"        return cls._make({codec}.unpack(body))"]
-    lines = [f"        message = cls._make({codec}.unpack(body))"]
+        return [f"        return cls._make({codec}.unpack({body}))"]
+    lines = [f"        message = cls._make({codec}.unpack({body}))"]
     for f in enums:
         lines += [
             f"        if message.{f.name} >= {len(f.enum)}:",
@@ -125,6 +137,12 @@ def _rows(messages: list[Message]) -> list[str]:
         else:
             lines.append(f"    0x{m.id:02X}: np.dtype([{', '.join(columns)}]),")
     return [*lines, "}"]
+
+
+def _least(messages: list[Message]) -> list[str]:
+    """Sizes of the shortest bodies, where they are not those of `ROWS`."""
+    shorter = [f"    0x{m.id:02X}: {m.least}," for m in messages if m.least < m.size]
+    return ["LEAST = {  # id: bytes of a body without the fields that were added", *shorter, "}"]
 
 
 def _greatest(messages: list[Message]) -> list[str]:

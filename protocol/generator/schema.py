@@ -10,6 +10,7 @@ import hashlib
 import json
 import struct
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -51,6 +52,7 @@ class Field:
     enum: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
     later: int = 0  # so many last members of `enum` came later: not part of the schema hash
+    added: bool = False  # came later: not part of the schema hash, and absent where it and all behind it are zero
     enum_name: str = ""  # name of the enumeration in code: its name in [enums], or the field's
 
     @property
@@ -82,6 +84,16 @@ class Message:
     @property
     def size(self) -> int:
         return struct.calcsize(self.format)
+
+    @property
+    def least(self) -> int:
+        """Size of the shortest body: of the fields that were not added."""
+        return sum(f.size for f in self.fields if not f.added)
+
+    def pack(self, values: Iterable[int]) -> bytes:
+        """A body, without the zeros at the end of the fields that were added."""
+        body = struct.pack(self.format, *values)
+        return body[: self.least] + body[self.least :].rstrip(b"\0")
 
     @property
     def has_fixed_seed(self) -> bool:
@@ -129,6 +141,8 @@ def _read_field(row: dict[str, Any], shared: dict[str, list[str]]) -> Field:
 def _check(message: Message, file_name: str) -> None:
     if unknown := {f.type for f in message.fields} - set(WIRE_TYPES):
         raise ValueError(f"{file_name}: message {message.name}: unknown type {unknown}")
+    if [f.added for f in message.fields] != sorted(f.added for f in message.fields):
+        raise ValueError(f"{file_name}: message {message.name}: fields are added at the end")
     if (message.direction == "host") != bool(message.id & HOST_IDS):
         raise ValueError(
             f"{file_name}: message {message.name}: ids from 0x80 belong to the host, the others to board and gateway"
@@ -147,7 +161,11 @@ def schema_hash(messages: list[Message]) -> int:
             m.id,
             m.name,
             m.direction,
-            [[f.name, f.type, f.unit, f.invalid, f.enum[: len(f.enum) - f.later], f.flags] for f in m.fields],
+            [
+                [f.name, f.type, f.unit, f.invalid, f.enum[: len(f.enum) - f.later], f.flags]
+                for f in m.fields
+                if not f.added
+            ],
         ]
         for m in board_messages(messages)
         if not m.optional

@@ -31,7 +31,7 @@ def _frames(message: Message, schema_seed: int) -> list[dict[str, Any]]:
     seed = FIXED_SEED if message.has_fixed_seed else schema_seed
     rows: list[dict[str, Any]] = []
     for sequence, fields in zip(SEQUENCES, _sample_values(message), strict=False):
-        covered = struct.pack("<BH", message.id, sequence) + struct.pack(message.format, *fields.values())
+        covered = struct.pack("<BH", message.id, sequence) + message.pack(fields.values())
         payload = covered + struct.pack("<H", binascii.crc_hqx(covered, seed))
         frame = cobs.encode(payload) + b"\0"
         rows.append({"message": message.name, "sequence": sequence, "fields": fields, "frame": frame.hex()})

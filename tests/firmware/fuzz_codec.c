@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Feeds bytes to the firmware's codec: as a USB stream into link_receive, as a payload through COBS and back, and as a
- * message into a send buffer of any size. With libFuzzer (clang -fsanitize=fuzzer -DLIBFUZZER), or alone: ./fuzz SEED
- * COUNT. */
+ * message into a send buffer of any size. With libFuzzer only (make fuzz). */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -106,51 +105,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t length)
 		check_send(bytes[0], bytes + 2, (uint8_t)(length - 2 > MSG_MAX_SIZE ? MSG_MAX_SIZE : length - 2), bytes[1]);
 	return 0;
 }
-
-#ifndef LIBFUZZER
-static uint64_t state;
-
-/* splitmix64 [Steele, Lea, Flood 2014] */
-static uint32_t below(uint32_t limit)
-{
-	uint64_t z = state += 0x9E3779B97F4A7C15ull;
-	z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-	z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-	return (uint32_t)((z ^ (z >> 31)) % limit);
-}
-
-/* A stream of frames from the host, most of them whole, some with a flipped byte. */
-static size_t frames(uint8_t *out)
-{
-	size_t end = 0;
-	while (end < LONGEST / 2) {
-		uint8_t payload[FRAME_PAYLOAD_MAX];
-		for (uint8_t i = 0; i < sizeof payload; i++)
-			payload[i] = (uint8_t)below(3);
-		uint8_t id = (uint8_t)(MSG_IDENTIFY + below(4));
-		end += frame_encode(out + end, payload, id, (uint16_t)below(65536), (uint8_t)below(7));
-		if (below(4) == 0)
-			out[end - 1 - below(5)] ^= (uint8_t)(1u << below(8));
-	}
-	return end;
-}
-
-static size_t noise(uint8_t *out)
-{
-	uint32_t length = below(LONGEST), values = 1 + below(256);
-	for (uint32_t i = 0; i < length; i++)
-		out[i] = (uint8_t)below(values);
-	return length;
-}
-
-int main(int argc, char **argv)
-{
-	static uint8_t bytes[2 * LONGEST];
-	if (argc != 3)
-		return 2;
-	state = strtoull(argv[1], NULL, 0);
-	for (long left = strtol(argv[2], NULL, 0); left > 0; left--)
-		LLVMFuzzerTestOneInput(bytes, left % 2 ? frames(bytes) : noise(bytes));
-	return 0;
-}
-#endif

@@ -86,11 +86,15 @@ def test_commands_are_answered(bench: Bench) -> None:
     wanted = m.Configure(
         m.Sensors.RANGER_LEFT | m.Sensors.SYNC, m.Schedule.SEQUENTIAL, 250, 99, m.PressureMode.HIGH_RESOLUTION
     )
+    bench.ask(wanted._replace(more_sensors=0x81))  # of a newer host
+    bench.ask(m.Subscribe(m.Reports.BOARD_HEALTH, 0x81))
     bench.ask(wanted)
     found = bench.run(50)
     assert any(isinstance(x, m.Identity) for x in found)
     assert [x.token for x in found if isinstance(x, m.ClockReply)] == [0x1234]
-    assert [x for x in found if isinstance(x, m.Configuration)][-1][1:] == (wanted.sensors, 1, 200, 20, 1)
+    assert [x[1:] for x in found if isinstance(x, m.Configuration)][-2:] == [(wanted.sensors, 1, 200, 20, 1, 0)] * 2
+    assert kinds(found)["BoardHealth"] == 1
+    bench.ask(m.Subscribe(0))
     bench.run(200)
     count = kinds(bench.run(2_000))
     assert set(count) <= {"Ping", "Sync", "Identity", "Status"}  # no gyro, and so none's health

@@ -11,7 +11,6 @@ import pytest
 
 from board_runs import Bench, needs_twin, quiet_rows
 from echostep.board import messages as m
-from echostep.board.reports import BoardReports
 from echostep_app.board.faults.health import board_findings
 from firmware.findings import findings_of
 from firmware.test_twin_kit_2026 import extended_rows
@@ -123,22 +122,13 @@ def causes(bench: Bench, quantity: str) -> set[int]:
     return {getattr(x, f"fault_{quantity}") for x in bench.messages if isinstance(x, m.Status)}
 
 
-def findings(bench: Bench) -> list[str]:
-    """The findings on all reports so far."""
-    reports = BoardReports()
-    for message in bench.messages:
-        reports.add(message)
-    return [str(finding) for finding in board_findings(reports)]
-
-
 def named(failure: Failure) -> str:
     return failure.switch
 
 
 def begun(bench: Bench, *switches: str) -> Callable[[int], list[m.Message]]:
     """A board with these parts, subscribed; what it sends in so many milliseconds, on a foot or on a belt that stand still."""
-    for switch in switches:
-        bench.fault(switch)
+    bench.fault(*switches)
     bench.subscribe()
     rows = extended_rows if "kit=foot" in switches else quiet_rows
     return lambda milliseconds: bench.run(milliseconds, rows(milliseconds))
@@ -150,7 +140,7 @@ def test_a_part_that_fails_is_named_and_comes_back(bench: Bench, failure: Failur
     run(2_000)
     before = measured(run(1_000))
     assert before[failure.measures]
-    assert findings(bench) == []
+    assert board_findings(bench.reports) == []
     bench.fault(failure.switch)
     run(3_500 if failure.measures == "pressure" else 2_200)
     silent = measured(run(1_000))
@@ -161,7 +151,7 @@ def test_a_part_that_fails_is_named_and_comes_back(bench: Bench, failure: Failur
     bench.fault(failure.switch.partition("=")[0] + "=ok")
     run(4_500 if failure.measures == "pressure" else 3_000)
     assert measured(run(1_000))[failure.measures] >= 0.9 * before[failure.measures]
-    assert findings(bench) == []
+    assert board_findings(bench.reports) == []
 
 
 @pytest.mark.parametrize("failure", FROM_THE_START, ids=named)
@@ -198,12 +188,13 @@ def test_parts_may_be_swapped_in_mid_walk_and_survive_a_reset(bench: Bench, kind
         }
 
     for part in parts:
-        for switch in plugged.format(part).split():
-            bench.fault(switch)
+        bench.fault(*plugged.format(part).split())
         assert any(is_seen(part) for _ in range(6))
         bench.fault("reset=watchdog")
         bench.subscribe()
         pings = ({p.outcome for p in run(1_000) if isinstance(p, m.Ping)} for _ in range(3))
         assert any(found == {m.Outcome.ECHO} for found in pings)
         after_a_crash = ("was not tested", "restarted")
-        assert [text for text in findings(bench)[1:] if not any(words in text for words in after_a_crash)] == []
+        assert [
+            f for f in board_findings(bench.reports)[1:] if not any(words in str(f) for words in after_a_crash)
+        ] == []

@@ -8,7 +8,7 @@ import pytest
 
 from board_runs import Bench, kinds, needs_twin
 from echostep.board import messages as m
-from echostep.board.reports import SUBSCRIBE, BoardReports
+from echostep.board.reports import SUBSCRIBE
 from echostep_app.board.faults.health import board_findings
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
@@ -32,9 +32,8 @@ def foot_rows(milliseconds: int) -> Rows:
 def foot(bench: Bench) -> Bench:
     """A foot board, subscribed."""
     bench.fault("kit=foot")
-    bench.run(300, foot_rows(300))
-    bench.ask(SUBSCRIBE)
-    bench.run(1_200, foot_rows(1_200))
+    bench.subscribe(foot_rows)
+    run(bench, 1_200)
     return bench
 
 
@@ -50,14 +49,6 @@ def health(bench: Bench) -> m.FootHealth:
     return next(x for x in reversed(bench.messages) if isinstance(x, m.FootHealth))
 
 
-def words(bench: Bench) -> list[str]:
-    """The findings on all reports so far."""
-    kept = BoardReports()
-    for message in bench.messages:
-        kept.add(message)
-    return [str(finding) for finding in board_findings(kept)]
-
-
 def test_the_part_is_found_and_the_board_becomes_a_foot_board(foot: Bench) -> None:
     found = run(foot, 2_000)
     parts = next(x for x in reversed(found) if isinstance(x, m.Parts))
@@ -70,16 +61,14 @@ def test_the_part_is_found_and_the_board_becomes_a_foot_board(foot: Bench) -> No
     first, last = (x._asdict() for x in [y for y in found if isinstance(y, m.Status)][:2])
     counters = [k for k in first if k.startswith(("dropped_", "errors_"))]
     assert [first[k] for k in counters] == [last[k] for k in counters]  # the first moments sought the belt's sensors
-    assert words(foot) == []
+    assert board_findings(foot.reports) == []
 
 
 @pytest.mark.parametrize("undefined", ["zeros", "ones", "noise"])
 def test_the_part_is_found_whatever_its_idle_line_reads(bench: Bench, undefined: str) -> None:
     """Its board pulls MISO down against the processor's pull-up. No frame for another part may come before: it would write registers."""
-    bench.fault("kit=foot")
-    bench.fault(f"miso_undefined={undefined}")
-    run(bench, 300)
-    bench.ask(SUBSCRIBE)
+    bench.fault("kit=foot", f"miso_undefined={undefined}")
+    bench.subscribe(foot_rows)
     run(bench, 1_000)
     assert len(samples(run(bench, 1_000))) > 220
     assert not [text for _, text in bench.board.trace if "misreads" in text]
@@ -93,7 +82,7 @@ def test_no_sample_with_wrong_bits_reaches_the_host(foot: Bench, errors: int) ->
     assert {x[2:] for x in found} == {tuple(STILL.ravel())}
     assert len(found) > 0.9 * 20 * RATE_HZ
     assert health(foot).errors > 100 * errors / 3
-    assert [text for text in words(foot) if text.startswith("foot sensor (ICM-20649): sent wrong bits")]
+    assert [f for f in board_findings(foot.reports) if str(f).startswith("foot sensor (ICM-20649): sent wrong bits")]
 
 
 def test_every_sample_comes_and_is_stamped_within_the_limit(foot: Bench) -> None:
@@ -125,8 +114,7 @@ def test_the_ranges_are_30_g_and_4000_degrees_a_second(foot: Bench) -> None:
 
 
 def test_a_part_that_is_plugged_in_later_is_found(bench: Bench) -> None:
-    bench.fault("kit=foot")
-    bench.fault("icm20649=absent")
+    bench.fault("kit=foot", "icm20649=absent")
     run(bench, 1_000)
     bench.ask(SUBSCRIBE)
     bench.fault("icm20649=ok")
@@ -149,14 +137,3 @@ def test_a_host_that_asks_for_other_sensors_gets_none(foot: Bench) -> None:
     found = run(foot, 1_000)
     assert next(x for x in found if isinstance(x, m.Configuration)).sensors == 0
     assert not kinds(found)["Ping"] + kinds(found)["Gyros"]
-
-
-@pytest.mark.parametrize("kit", ["papers", "2026"])
-def test_a_belt_board_is_none(bench: Bench, kit: str) -> None:
-    bench.fault(f"kit={kit}")
-    bench.subscribe()
-    found = bench.run(3_000)
-    assert not kinds(found)["Foot"] + kinds(found)["FootHealth"]
-    parts = next(x for x in reversed(found) if isinstance(x, m.Parts))
-    assert (parts.part_foot, parts.identity_foot) == (m.Part.NONE, 0)
-    assert kinds(found)["Ping"] >= 80

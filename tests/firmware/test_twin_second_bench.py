@@ -51,10 +51,7 @@ def findings(bench: Bench) -> list[Finding]:
 
 
 def run_with(bench: Bench, *faults: str) -> list[str]:
-    for fault in faults:
-        bench.fault(fault)
-    bench.run(300, rows(300))
-    bench.ask(SUBSCRIBE_ELECTRICAL)
+    begin(bench, *faults)
     bench.run(6_000, rows(6_000))
     return [str(finding) for finding in findings(bench)]
 
@@ -68,11 +65,8 @@ def test_each_failure_of_the_first_day_has_its_words(bench: Bench, faults: tuple
 @pytest.mark.parametrize(("kit", "level"), [("2026", "MISO low"), ("papers", "MISO high"), ("foot", "MISO low")])
 def test_a_board_that_is_well_has_no_electrical_finding(bench: Bench, kit: str, level: str) -> None:
     run_with(bench, f"kit={kit}")
-    reports = BoardReports()
-    for message in bench.messages:
-        reports.add(message)
-    assert electrical_findings(reports) == []
-    assert level in level_line(reports)
+    assert electrical_findings(bench.reports) == []
+    assert level in level_line(bench.reports)
 
 
 def test_a_resistor_makes_the_idle_line_a_one(bench: Bench) -> None:
@@ -83,8 +77,7 @@ def test_a_resistor_makes_the_idle_line_a_one(bench: Bench) -> None:
 
 def test_a_bare_processor_board_is_normal(bench: Bench) -> None:
     """As flashed in step 2, with mains hum on its open inputs."""
-    faults = ["bmp390", "imu_thigh", "imu_calf", "imu_belt", "pulse_left", "pulse_right", "lis3mdl"]
-    said = run_with(bench, "kit=2026", "hum=50", *(f"{name}=absent" for name in faults))
+    said = run_with(bench, "kit=2026", "hum=50", *(f"{name}=absent" for name in BARE))
     assert [text for text in said if text.startswith("SPI bus: no part answers on SPI, and nothing pulls MISO down")]
     assert [text for text in said if text.startswith("D13: is open")]
     assert not any(isinstance(x, m.Ping) and x.outcome == m.Outcome.ECHO for x in bench.messages)
@@ -105,18 +98,9 @@ def rows(milliseconds: int, echo_us: int = 0) -> np.ndarray[tuple[int], np.dtype
 
 def begin(bench: Bench, *faults: str) -> None:
     """A board with these faults, asked for all reports."""
-    for fault in faults:
-        bench.fault(fault)
+    bench.fault(*faults)
     bench.run(300, rows(300))
     bench.ask(SUBSCRIBE_ELECTRICAL)
-
-
-def electrical(bench: Bench) -> list[str]:
-    """What the newest levels of the inputs say."""
-    reports = BoardReports()
-    for message in bench.messages:
-        reports.add(message)
-    return [str(finding) for finding in electrical_findings(reports)]
 
 
 @pytest.mark.parametrize("reads", ["ones", "zeros", "noise"])
@@ -124,7 +108,7 @@ def test_a_led_on_d13_is_no_ranger(bench: Bench, reads: str) -> None:
     """N1: a Micro's LED holds the bare pin between the thresholds; nothing is wrong with it."""
     begin(bench, "kit=2026", f"d13_led={reads}", *(f"{name}=absent" for name in BARE))
     bench.run(4_000, rows(4_000))
-    assert not [text for text in electrical(bench) if text.startswith("D13") and "driven low" in text]
+    assert not [f for f in electrical_findings(bench.reports) if f.subject == "D13" and "driven low" in str(f)]
 
 
 def test_a_module_without_a_timeout_hears_the_wall_again(bench: Bench) -> None:
@@ -236,18 +220,13 @@ def test_two_boards_of_a_kit_have_two_names(bench: Bench, kit: str, name: str) -
     assert [text for _, text in bench.board.trace if text.startswith("usb interface")] == [f"usb interface {name}"]
 
 
-def lamp_changes(bench: Bench, milliseconds: int) -> int:
-    """How often the lamp changes."""
-    before = len(bench.board.trace)
-    bench.run(milliseconds, rows(milliseconds, ECHO_US))
-    return sum(text.startswith("lamp") for _, text in bench.board.trace[before:])
-
-
-def test_the_lamp_beats_slowly_on_a_board_that_is_well(bench: Bench) -> None:
+@pytest.mark.parametrize(("kit", "part"), [("2026", "imu_calf"), ("foot", "icm20649")])
+def test_the_lamp_beats_slowly_on_a_board_that_is_well(bench: Bench, kit: str, part: str) -> None:
     """N9: a beat says that it lives; a fast one, that a part is missing."""
-    begin(bench, "kit=2026")
-    bench.run(2_000, rows(2_000, ECHO_US))
-    assert 9 <= lamp_changes(bench, 5_000) <= 10
-    bench.fault("imu_calf=absent")
-    bench.run(1_000, rows(1_000))
-    assert 70 <= lamp_changes(bench, 5_000) <= 80
+    begin(bench, f"kit={kit}")
+    for way, least, most in (("ok", 9, 10), ("absent", 70, 80)):
+        bench.fault(f"{part}={way}")
+        bench.run(2_000, rows(2_000, ECHO_US))
+        before = len(bench.board.trace)
+        bench.run(5_000, rows(5_000, ECHO_US))
+        assert least <= sum(text.startswith("lamp") for _, text in bench.board.trace[before:]) <= most

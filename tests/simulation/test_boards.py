@@ -73,7 +73,7 @@ def test_commands_are_answered_and_obeyed() -> None:
     found = heard(board.advance(rows_of(20)), reader)
     assert any(isinstance(x, m.Identity) for x in found)
     assert [x.token for x in found if isinstance(x, m.ClockReply)] == [0x1234]
-    assert [x for x in found if isinstance(x, m.Configuration)][-1][1:] == (wanted.sensors, 1, 200, 20, 1)
+    assert [x for x in found if isinstance(x, m.Configuration)][-1][1:] == (wanted.sensors, 1, 200, 20, 1, 0)
     heard(board.advance(rows_of(200)), reader)
     later = heard(board.advance(rows_of(3_000)), reader)
     assert {type(x) for x in later} == {m.Ping, m.Sync, m.Identity, m.Status}

@@ -86,7 +86,7 @@ def test_bad_wiring_is_found() -> None:
         "pin CS is not wired": with_device("2026", replace(thigh, pins={"VIN": "5V", "GND": "GND"})),
         "net CS_THIHG: it ends nowhere": with_device("2026", replace(thigh, pins=thigh.pins | {"CS": "CS_THIHG"})),
         "it has several drivers": with_device("2026", replace(thigh, pins=thigh.pins | {"DO": "CS_CALF"})),
-        "pin I1 must stay open": with_device("2026", replace(thigh, pins=thigh.pins | {"I1": "SCK"})),
+        "pin I2 must stay open": with_device("2026", replace(thigh, pins=thigh.pins | {"I2": "SCK"})),
         "it has no pin C5": with_device("2026", replace(thigh, pins=thigh.pins | {"C5": "SCK"})),
         "ground pin GND is wired to 5V": with_device("2026", replace(thigh, pins=thigh.pins | {"GND": "5V"})),
     }

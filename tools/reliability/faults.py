@@ -86,7 +86,7 @@ FAULTS = (
         TwinFault(("kit=2026", f"pulse_left={module}"), ("pulse_left=ok", "kit=papers"))
         for module in ("no_timeout", "ghost")
     ),
-    *(TwinFault(("kit=2026", f"{way}_errors={errors}")) for way in ("spi", "mosi") for errors in (3, 30)),
+    *(TwinFault(("kit=2026", f"{way}_errors=30")) for way in ("spi", "mosi")),
     TwinFault(("sda=stuck",)),
     TwinFault(("sda=stuck_forever",), ("sda=ok",)),
     TwinFault(("scl=stuck",), ("scl=ok",)),

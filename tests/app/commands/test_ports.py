@@ -150,8 +150,8 @@ def test_two_boards_are_found_told_apart_tracked_and_replayed(tmp_path: Path, mo
     assert track.read_bytes().count(b"\n") > 10
     assert (tmp_path / "again/track.csv").read_bytes() == track.read_bytes()
     text = "\n".join(report.lines)
-    assert f"board     {board}: firmware 1.9.0" in text
-    assert f"foot board {foot}: firmware 1.9.0" in text
+    assert f"board     {board}: firmware 1.9.1" in text
+    assert f"foot board {foot}: firmware 1.9.1" in text
     assert "foot      ICM-20649, identity 0xE1, running, 24 degC" in text
     assert "several" not in text
     assert not [f for f in report.findings if "foot" in f.subject and f.severity is Severity.FAULT]  # the wearer walks

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from board_runs import ROOT
 from echostep.board import messages as m
-from echostep.board.frames import BoardReader, FrameCounts, StaleFirmwareError, encode
+from echostep.board.frames import BoardReader, FrameCounts, StaleFirmwareError, crc, encode
 from naive.frames import BoardReader as NaiveReader
 
 VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]
@@ -174,6 +174,34 @@ def test_lost_sequence_numbers_are_counted_across_the_wrap() -> None:
     for sequence in (65534, 65535, 2, 3):
         reader.feed(encode(gyros(1), sequence))
     assert reader.counts.lost == 2
+
+
+OF_FIRMWARE_1_9 = {  # frames, sequence 1, all fields at their greatest
+    m.Status: "0307012fffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffff09090909090909ffffffe79c00",
+    m.Configuration: "0309010cffffffffff02ffff011e0800",
+    m.Subscribe: "03850104ff74e200",
+}
+
+
+@pytest.mark.parametrize("kind", OF_FIRMWARE_1_9)
+def test_a_message_is_read_with_and_without_the_fields_that_came_later(kind: type[m.Message]) -> None:
+    """Where they are zero the frame is that of the older version; a body with half of a field, or more than all, is none."""
+    reader, old = BoardReader(), bytes.fromhex(OF_FIRMWARE_1_9[kind])
+    (message,) = reader.feed(old)
+    assert isinstance(message, kind)
+    assert tuple(message)[-1] == 0
+    assert encode(message, 1) == old
+    longer = kind._make((*tuple(message)[:-1], 0x81))
+    assert len(encode(longer, 1)) == len(old) + 1
+    frames = reader.frames(encode(longer, 2) + encode(message, 3))
+    assert frames.messages() == [longer, message]
+    assert [row.item()[-1] for row in frames.rows(kind)[1]] == [0x81, 0]
+    for body in (message.pack()[:-1], longer.pack() + b"\1"):
+        plain = bytes([message.id, 4, 0]) + body
+        assert reader.feed(cobs.encode(plain + crc(message.id, plain).to_bytes(2, "little")) + b"\0") == []
+        with pytest.raises(ValueError, match="bytes, expected"):
+            kind.unpack(body)
+    assert (reader.counts.good, reader.counts.bad_message) == (3, 2)
 
 
 @pytest.mark.parametrize("value", [2, 255])

@@ -55,11 +55,11 @@ def parts_table(kit: str) -> str:
 
 
 def reasons_table(kit: str) -> str:
-    """How the firmware knows each part of a kit, and why it was chosen."""
-    rows = [row for row in parts() if kit in row["kits"] and "identity" in row]
-    return "| role | part | identity register | why this one |\n|---|---|---|---|\n" + "".join(
-        f"| {row['role']} | {row['part']} | {row['identity']} | {row['why']} |\n" for row in rows
-    )
+    """How the firmware knows each part of a kit, why it was chosen, and what serves when it is gone."""
+    rows = [row for row in parts() if kit in row["kits"] and "instead" in row]
+    head = "| role | part | identity register | why this one | when it is gone |\n|---|---|---|---|---|\n"
+    cells = ((row["role"], row["part"], row.get("identity", "-"), row["why"], row["instead"]) for row in rows)
+    return head + "".join(f"| {' | '.join(texts)} |\n" for texts in cells)
 
 
 def wires_table(board: WiredBoard) -> str:

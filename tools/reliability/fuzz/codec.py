@@ -20,31 +20,24 @@ from places import OUT, ROOT
 from reliability.campaign import CampaignJournal, Figure, options, report
 
 FIRMWARE = ROOT / "firmware"
+TESTS = ROOT / "tests/firmware"
 SOURCES = [
-    ROOT / "tests/firmware/fuzz_codec.c",
-    *(FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c", "link.c", "status.c")),
+    TESTS / "fuzz_codec.c",
+    *(FIRMWARE / f"{name}.c" for name in ("cobs", "frame", "messages", "link", "status")),
 ]
 # On a board that does what the input says
-WHOLE = [ROOT / "tests/firmware/fuzz_firmware.c", *sorted(FIRMWARE.glob("*.c"))]
-CORPUS = ROOT / "tests/firmware/corpus.txt"
+WHOLE = [TESTS / "fuzz_firmware.c", TESTS / "stub_board.c", *sorted(FIRMWARE.glob("*.c"))]
+CORPUS = TESTS / "corpus.txt"
 FOLDER = OUT / "fuzz"
-FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-DLIBFUZZER", "-fsanitize=fuzzer,address,undefined"]
+FLAGS = ["-std=c11", "-O2", "-g", f"-I{FIRMWARE}", "-fsanitize=fuzzer,address,undefined"]
 LONGEST = (70, 600)  # bytes of an input, in turn by shard: a frame, as many as fuzz_codec.c takes
 WHOLE_LONGEST = (4000,)  # about a second of the board
 
 
 def build(program: Path, sources: Sequence[Path] = SOURCES) -> Path:
     """The fuzzer, compiled; of the whole firmware, `main` is called by it."""
-    command = [
-        "clang",
-        *FLAGS,
-        "-Dmain=firmware_main",
-        "-fno-sanitize-recover=all",
-        "-o",
-        str(program),
-        *map(str, sources),
-    ]
-    subprocess.run(command, check=True)
+    options = ["-Dmain=firmware_main", "-fno-sanitize-recover=all", "-o", str(program)]
+    subprocess.run(["clang", *FLAGS, *options, *map(str, sources)], check=True)
     return program
 
 

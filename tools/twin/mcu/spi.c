@@ -75,6 +75,8 @@ static avr_cycle_count_t done(avr_t *a, avr_cycle_count_t when, void *param)
 	for (struct spi_device *d = devices; d; d = d->next) {
 		int driven = d->selected ? d->part.model->exchange(d, outgoing) : SPI_OPEN;
 
+		if (!d->selected && d->part.model->overhear)
+			d->part.model->overhear(d);
 		if (driven != SPI_OPEN && answer != SPI_OPEN)
 			bench_trace("contention on MISO");
 		if (driven != SPI_OPEN)

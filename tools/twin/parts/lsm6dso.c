@@ -23,6 +23,7 @@ static const struct {
 enum { ZEROS = OTHER_FAULTS, WRONG_IDENTITY, NEVER_READY, STUCK, SATURATED, WEAK, VIBRATING, I3C };
 #define IDENTITY 0x6C
 #define OTHER_IDENTITY 0x69 /* an LSM6DS3 */
+#define CONFUSING 90 /* bytes for others while I3C is on, after which the identity reads 0; assumed */
 #define BOOT US(10000)
 #define GYROS_ON US(70000)
 #define SLOWEST_HERTZ 13.02 /* 1667 / 128 */
@@ -43,7 +44,7 @@ static struct imu {
 	double excited; /* counts of 0.035 deg/s added by the self-test at the time `excited_at` */
 	avr_cycle_count_t excited_at;
 	int response;
-	bool confused; /* by frames for others, for I3C was on [STMicroelectronics/stm32-lsm6dso issue 1] */
+	unsigned overheard; /* such bytes [STMicroelectronics/stm32-lsm6dso, issue 1] */
 	struct axes kept; /* of a part that is stuck */
 } imus[3] = {
 	{ .file.spi = { .part = PART(lsm6dso, PLACE_THIGH, "imu_thigh"), .port = 'B', .pin = 4 } },
@@ -149,7 +150,7 @@ static int get(void *self, uint8_t at)
 {
 	struct imu *u = self;
 
-	if (at == WHO_AM_I && u->confused)
+	if (at == WHO_AM_I && u->overheard >= (u->file.part.fault.value == I3C ? 1 : CONFUSING))
 		return 0;
 	if (at == WHO_AM_I)
 		return u->file.part.fault.value == WRONG_IDENTITY ? OTHER_IDENTITY : IDENTITY;
@@ -178,7 +179,14 @@ static void set(void *self, uint8_t at, uint8_t value)
 	}
 	u->registers[at] = value;
 	if (at == CTRL9_XL && (value & I3C_OFF))
-		u->confused = false;
+		u->overheard = 0;
+}
+
+static void overhear(void *self)
+{
+	struct imu *u = self;
+
+	u->overheard += !(u->registers[CTRL9_XL] & I3C_OFF);
 }
 
 /* Without counting addresses a frame is of one register. */
@@ -194,13 +202,6 @@ static int exchange(void *self, uint8_t sent)
 	return (u->registers[CTRL3_C] & THREE_WIRES) && u->file.part.fault.value != ZEROS ? SPI_OPEN : answer;
 }
 
-static void resume(void *self)
-{
-	struct imu *u = self;
-
-	u->confused = u->file.part.fault.value == I3C && !(u->registers[CTRL9_XL] & I3C_OFF);
-}
-
 static void power(void *self)
 {
 	struct imu *u = self;
@@ -213,8 +214,7 @@ static void power(void *self)
 		u->response = 4600 + (int)random_below(15000); /* 161 to 686 deg/s */
 	u->file.up_at = avr->cycle + BOOT;
 	u->excited = 0.0;
-	u->ready = 0;
-	resume(self);
+	u->overheard = u->ready = 0;
 }
 
 static void changed(void *self, unsigned before)
@@ -222,7 +222,6 @@ static void changed(void *self, unsigned before)
 	struct imu *u = self;
 
 	part_returned(self, before);
-	resume(self);
 	u->kept = input.motion[u - imus];
 }
 
@@ -231,10 +230,10 @@ const struct model lsm6dso = {
 	.faults = "ok absent zeros wrong_identity never_ready stuck saturated no_self_test vibrating i3c",
 	PARTS(imus),
 	.power = power,
-	.resume = resume,
 	.changed = changed,
 	.select = registers_select,
 	.exchange = exchange,
+	.overhear = overhear,
 	.get = get,
 	.set = set,
 	.zeros = ZEROS,

@@ -91,6 +91,7 @@ struct model {
 
 	void (*select)(void *self, bool on);         /* on SPI */
 	int (*exchange)(void *self, uint8_t out);    /* SPI_OPEN: it does not drive MISO */
+	void (*overhear)(void *self);                /* a byte for another part */
 
 	bool (*start)(void *self, bool read);               /* on I2C: acknowledge? */
 	bool (*write)(void *self, uint8_t byte, bool first); /* acknowledge? */

@@ -20,7 +20,7 @@ from cobs import cobs
 from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Ints, Octets
-from echostep.board.messages import BY_ID, GREATEST, ROWS, SCHEMA_HASH, SCHEMA_SEED, Message
+from echostep.board.messages import BY_ID, GREATEST, LEAST, ROWS, SCHEMA_HASH, SCHEMA_SEED, Message
 from echostep.errors import EchostepError
 from echostep.jit import kernel, lean_part
 
@@ -43,7 +43,7 @@ _GOOD, _BAD_COBS, _BAD_LENGTH, _BAD_CRC, _BAD_MESSAGE, _LOST, _SEQUENCE, _TICKS,
 class _Schema(NamedTuple):
     """The schema as arrays. It is an argument of the kernels, because numba's cache would keep the old values of globals of another file."""
 
-    size: Ints  # (256,) bytes of the body by id, -1: no such message
+    size: Ints  # (256, 2) least and greatest number of bytes of the body by id, -1: no such message
     greatest: Octets  # (256, MAX_BODY) greatest value of each byte of a body
     crc: Ints  # (256,) CRC of one byte
     seed: int
@@ -54,9 +54,9 @@ class _Schema(NamedTuple):
 
 def _schema() -> _Schema:
     """The generated tables of `messages` as arrays."""
-    sizes, greatest = np.full(256, -1, np.int64), np.full((256, MAX_BODY), 255, np.uint8)
+    sizes, greatest = np.full((256, 2), -1, np.int64), np.full((256, MAX_BODY), 255, np.uint8)
     for identifier, kind in ROWS.items():
-        sizes[identifier] = kind.itemsize
+        sizes[identifier] = LEAST.get(identifier, kind.itemsize), kind.itemsize
     for identifier, offset, value in GREATEST:
         greatest[identifier, offset] = value
     hash_offset = int(ROWS[_IDENTITY].fields["schema_hash"][1])  # type: ignore[index]
@@ -252,9 +252,9 @@ def _decode_cobs(stream: Octets, begin: int, end: int, payload: Octets) -> bool:
 
 @lean_part
 def _is_valid(payload: Octets, size: int, schema: _Schema) -> bool:
-    """Whether the schema has this message, with this size and these enumeration values; an identity must have this host's schema."""
+    """Whether the schema has this message, with such a size and these enumeration values; an identity must have this host's schema."""
     identifier = payload[0]
-    if schema.size[identifier] != size:
+    if not schema.size[identifier, 0] <= size <= schema.size[identifier, 1]:
         return False
     for k in range(size):
         if payload[HEAD + k] > schema.greatest[identifier, k]:

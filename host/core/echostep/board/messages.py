@@ -18,6 +18,11 @@ SCHEMA_SEED = 0xF917
 FIXED_SEED = 0xFFFF
 
 
+def _trimmed(body: bytes, least: int) -> bytes:
+    """A body without the zeros at the end of the fields that were added."""
+    return body[:least] + body[least:].rstrip(b"\0")
+
+
 class ResetCause(IntFlag):
     POWER_ON = 1
     EXTERNAL = 2
@@ -317,7 +322,7 @@ class Sync(NamedTuple):
         return cls._make(_SYNC.unpack(body))
 
 
-_STATUS = struct.Struct("<IHHHHHHHHHHHHHHHBBBBBBBBH")
+_STATUS = struct.Struct("<IHHHHHHHHHHHHHHHBBBBBBBBHB")
 
 
 class Status(NamedTuple):
@@ -348,6 +353,7 @@ class Status(NamedTuple):
     fault_pressure: int
     healthy: int
     memory_used: int  # byte
+    more_healthy: int = 0
 
     @property
     def id(self) -> int:
@@ -355,14 +361,14 @@ class Status(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _STATUS.pack(*self)
+        return _trimmed(_STATUS.pack(*self), 44)
 
     @classmethod
     def unpack(cls, body: bytes) -> Status:
         """Values of a body; raises ValueError when length or an enumeration is wrong."""
-        if len(body) != 44:
-            raise ValueError(f"status: {len(body)} bytes, expected 44")
-        message = cls._make(_STATUS.unpack(body))
+        if not 44 <= len(body) <= 45:
+            raise ValueError(f"status: {len(body)} bytes, expected 44 to 45")
+        message = cls._make(_STATUS.unpack(body.ljust(45, b"\0")))
         if message.fault_ranger_left >= 10:
             raise ValueError(f"status: fault_ranger_left {message.fault_ranger_left} is unknown")
         if message.fault_ranger_right >= 10:
@@ -405,7 +411,7 @@ class ClockReply(NamedTuple):
         return cls._make(_CLOCK_REPLY.unpack(body))
 
 
-_CONFIGURATION = struct.Struct("<IBBBBB")
+_CONFIGURATION = struct.Struct("<IBBBBBB")
 
 
 class Configuration(NamedTuple):
@@ -417,6 +423,7 @@ class Configuration(NamedTuple):
     gyro_rate_hz: int  # Hz
     compass_rate_hz: int  # Hz
     pressure_mode: int
+    more_sensors: int = 0
 
     @property
     def id(self) -> int:
@@ -424,14 +431,14 @@ class Configuration(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CONFIGURATION.pack(*self)
+        return _trimmed(_CONFIGURATION.pack(*self), 9)
 
     @classmethod
     def unpack(cls, body: bytes) -> Configuration:
         """Values of a body; raises ValueError when length or an enumeration is wrong."""
-        if len(body) != 9:
-            raise ValueError(f"configuration: {len(body)} bytes, expected 9")
-        message = cls._make(_CONFIGURATION.unpack(body))
+        if not 9 <= len(body) <= 10:
+            raise ValueError(f"configuration: {len(body)} bytes, expected 9 to 10")
+        message = cls._make(_CONFIGURATION.unpack(body.ljust(10, b"\0")))
         if message.schedule >= 3:
             raise ValueError(f"configuration: schedule {message.schedule} is unknown")
         if message.pressure_mode >= 2:
@@ -810,7 +817,7 @@ class ClockQuery(NamedTuple):
         return cls._make(_CLOCK_QUERY.unpack(body))
 
 
-_CONFIGURE = struct.Struct("<BBBBB")
+_CONFIGURE = struct.Struct("<BBBBBB")
 
 
 class Configure(NamedTuple):
@@ -821,6 +828,7 @@ class Configure(NamedTuple):
     gyro_rate_hz: int  # Hz
     compass_rate_hz: int  # Hz
     pressure_mode: int
+    more_sensors: int = 0
 
     @property
     def id(self) -> int:
@@ -828,14 +836,14 @@ class Configure(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _CONFIGURE.pack(*self)
+        return _trimmed(_CONFIGURE.pack(*self), 5)
 
     @classmethod
     def unpack(cls, body: bytes) -> Configure:
         """Values of a body; raises ValueError when length or an enumeration is wrong."""
-        if len(body) != 5:
-            raise ValueError(f"configure: {len(body)} bytes, expected 5")
-        message = cls._make(_CONFIGURE.unpack(body))
+        if not 5 <= len(body) <= 6:
+            raise ValueError(f"configure: {len(body)} bytes, expected 5 to 6")
+        message = cls._make(_CONFIGURE.unpack(body.ljust(6, b"\0")))
         if message.schedule >= 3:
             raise ValueError(f"configure: schedule {message.schedule} is unknown")
         if message.pressure_mode >= 2:
@@ -865,13 +873,14 @@ class CheckGyros(NamedTuple):
         return cls._make(_CHECK_GYROS.unpack(body))
 
 
-_SUBSCRIBE = struct.Struct("<B")
+_SUBSCRIBE = struct.Struct("<BB")
 
 
 class Subscribe(NamedTuple):
     """The optional messages to be sent from now on, until the port is opened again."""
 
     reports: int
+    more_reports: int = 0
 
     @property
     def id(self) -> int:
@@ -879,14 +888,14 @@ class Subscribe(NamedTuple):
 
     def pack(self) -> bytes:
         """Bytes of the body; raises struct.error when a value does not fit its type."""
-        return _SUBSCRIBE.pack(*self)
+        return _trimmed(_SUBSCRIBE.pack(*self), 1)
 
     @classmethod
     def unpack(cls, body: bytes) -> Subscribe:
         """Values of a body; raises ValueError when length or an enumeration is wrong."""
-        if len(body) != 1:
-            raise ValueError(f"subscribe: {len(body)} bytes, expected 1")
-        return cls._make(_SUBSCRIBE.unpack(body))
+        if not 1 <= len(body) <= 2:
+            raise ValueError(f"subscribe: {len(body)} bytes, expected 1 to 2")
+        return cls._make(_SUBSCRIBE.unpack(body.ljust(2, b"\0")))
 
 
 _BEACON = struct.Struct("<IIHHHh")
@@ -1047,6 +1056,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("fault_pressure", "u1"),
             ("healthy", "u1"),
             ("memory_used", "<u2"),
+            ("more_healthy", "u1"),
         ]
     ),
     0x08: np.dtype(
@@ -1063,6 +1073,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("gyro_rate_hz", "u1"),
             ("compass_rate_hz", "u1"),
             ("pressure_mode", "u1"),
+            ("more_sensors", "u1"),
         ]
     ),
     0x0A: np.dtype(
@@ -1190,10 +1201,16 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("gyro_rate_hz", "u1"),
             ("compass_rate_hz", "u1"),
             ("pressure_mode", "u1"),
+            ("more_sensors", "u1"),
         ]
     ),
     0x84: np.dtype([]),
-    0x85: np.dtype([("reports", "u1")]),
+    0x85: np.dtype(
+        [
+            ("reports", "u1"),
+            ("more_reports", "u1"),
+        ]
+    ),
     0x20: np.dtype(
         [
             ("gateway_ms", "<u4"),
@@ -1204,6 +1221,12 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("bearing", "<i2"),
         ]
     ),
+}
+LEAST = {  # id: bytes of a body without the fields that were added
+    0x07: 44,
+    0x09: 9,
+    0x83: 5,
+    0x85: 1,
 }
 GREATEST = (  # id, offset in the body, greatest value of the enumeration there
     (0x02, 4, 1),  # ping.ranger

@@ -67,9 +67,7 @@ class Step:
         """What is wrong with the sensor or its place, a sentence each."""
         percent = f"lengths are known to {100 * self.scale_sd:.0f} % (1 sd) only"
         force = f"the accelerometer shows {ins.GRAVITY_M_S2 * (1.0 + self.excess):.2f} m/s2 at rest, gravity is {ins.GRAVITY_M_S2}"
-        worn = (
-            f"the sensor does not rest while the foot stands, as on a shank or a thigh: {percent}; strap it to the shoe"
-        )
+        worn = f"the sensor does not rest while the foot stands: {percent}; wrong bits, a loose part, a shank or a thigh? Strap it to the shoe"
         wrong = f"{force}: an offset or a wrong scale, {percent}; calibrate it"
         return [worn] if self.unrest > 1.0 else [wrong] * (abs(self.excess) > MOST_EXCESS)
 
