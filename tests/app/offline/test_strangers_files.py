@@ -47,6 +47,7 @@ def test_held_rows_are_missing_and_a_clock_tells_the_time(
     assert says in (said := echostep("foot", "imu.txt", cwd=tmp_path, ends=0)).stderr + said.stdout
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("command", "name", "says"),
     [
