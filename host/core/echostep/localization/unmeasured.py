@@ -28,7 +28,8 @@ PAUSE_S, LONG_S = (
     5.0,
 )  # between two segments: nothing was received; of an unobserved segment: a walk out of the room
 UNOBSERVED_DOUBT = 0.2  # probability that such a way led out of the scattered cloud
-STEP_M = 0.5  # of a step that is no shuffle; a shorter one speaks by its share
+STEP_M, STEP_RAD = 0.5, 0.5  # of a step that is no shuffle; a shorter one speaks by its share
+SILENCE_S = 1.0  # in which rangers that are not silent hear something
 SHUFFLE = np.array([0.2, 0.2, 0.35])  # m, m, rad: after such a way or turn the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
@@ -47,7 +48,7 @@ class UnmeasuredWay:
         self.probability, self._on_plan = PRIOR, on_plan
         self.away = 0.0  # probability that the trunk left its cloud in a stand or gap that has just ended
         self.pause_s, self._end_s = 0.0, math.inf  # between the last two segments; end of the last one
-        self._has_heard, self._is_aloft, self._step = False, False, 0
+        self._heard_s, self._is_aloft, self._step = math.inf, False, 0  # when a ranger last heard something: never
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
 
@@ -75,10 +76,10 @@ class UnmeasuredWay:
 
     def _begun(self, measured: MeasuredSegment) -> float:
         """Odds that such a way has begun by the end of a segment, before its evidence."""
-        segment, heard = measured.segment, bool((measured.range_m > 0.0).any())
-        self._has_heard = self._has_heard or heard
+        segment = measured.segment
+        self._heard_s = segment.t1_s if (measured.range_m > 0.0).any() else self._heard_s
         silent_per_s = UNSEEN_PER_S if any(self._heard) or not len(measured.range_m) else SILENT_PER_S
-        per_s = silent_per_s if self._has_heard and not heard else BEGINS_PER_S
+        per_s = silent_per_s if segment.t1_s - self._heard_s > SILENCE_S else BEGINS_PER_S
         stood = max((1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s)), PRIOR)
         return (1.0 - stood) / stood
 
@@ -91,7 +92,8 @@ class UnmeasuredWay:
             self._look_anew(segment.t1_s)
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
         if is_step and not segment.aloft:
-            ratio = STEPPED * (1.0 if segment.unobserved else min(math.hypot(segment.dx_m, segment.dy_m) / STEP_M, 1.0))
+            way = math.hypot(segment.dx_m / STEP_M, segment.dy_m / STEP_M, segment.turn_rad / STEP_RAD)
+            ratio = STEPPED * (1.0 if segment.unobserved else min(way, 1.0))
         return ratio + sum(
             map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
         )
