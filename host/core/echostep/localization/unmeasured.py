@@ -21,7 +21,6 @@ from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 # Assumed, not measured. Rates (1/s) at which such a way begins: with a witness; in a silence that the stand began with; where rangers fell silent
 BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
-FASTEST_M_S = 10.0  # of a sprinter
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
 PAUSE_S, LONG_S = (
     1.0,
@@ -60,9 +59,6 @@ class UnmeasuredWay:
     def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
         """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
         segment, before = measured.segment, self.probability
-        if math.hypot(segment.dx_m, segment.dy_m) > FASTEST_M_S * max(segment.t1_s - segment.t0_s, 0.0):
-            segment = replace(segment, dx_m=0.0, dy_m=0.0, sd_m=WALKER_M_S * FOLLOWED_S, aloft=True)
-            measured = replace(measured, segment=segment)
         is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
         odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
