@@ -29,7 +29,7 @@ def test_the_fallen_the_lost_and_the_silent_come_first_each_in_words() -> None:
     assert "mayday: no motion for 40 s" in rows[0].notes
     kim, anna = rows[1], next(row for row in rows if row.name == "Anna")
     assert kim.words.startswith("lost, ")
-    assert kim.words == "lost, last known 0 s ago, Ground floor, in corridor, heard 2 s ago"  # no claim of a place
+    assert kim.words == "lost, last known 2 s ago, Ground floor, in corridor, heard 2 s ago"  # no claim of a place
     assert anna.words.endswith("within 0.4 m, heard 2 s ago")
     assert anna.words.startswith(f"{TOWER.levels[1].name}, ")
     assert rows[2].words.startswith("silent, ")
@@ -52,10 +52,14 @@ def test_a_report_carries_the_safe_radius_and_older_ones_have_none() -> None:
 def test_the_safe_radius_grows_while_nothing_is_heard() -> None:
     team = Team(now_s=0.0)
     team.hear("Kim", place(TOWER, 1.0, 1.0, 0))
-    team.pass_time(30.0)
+    team.pass_time(2.5)
     ((_, _, _, _, _, radius, protection),) = columns(team.scene().places, 7).tolist()
-    assert protection > 3.7 * 1.5 * 30.0  # 1 in 1,000 of a walk of 30 s at 1.5 m/s in any direction
-    assert 2.4 * 1.5 * 30.0 < radius < protection
+    assert (radius, protection) == pytest.approx((0.75 + 3.75, 0.4 + 3.75))  # at 1.5 m/s
+    (row,) = team.scene().rows
+    assert row.words == "uncertain, late 2 s, Ground floor, in corridor, within 4.2 m, heard 2 s ago"
+    team.pass_time(1.0)  # more than 5 m: nothing is claimed
+    ((_, _, _, _, _, radius, protection),) = columns(team.scene().places, 7).tolist()
+    assert np.isnan([radius, protection]).all()
 
 
 def test_places_are_those_of_the_reports() -> None:

@@ -20,7 +20,16 @@ from rich.console import Console
 from echostep.plan import load_plan
 from echostep_app.team.commander import _cells, as_tree, notes, table
 from echostep_app.team.inbox import MESSAGES_PER_TOPIC, Inbox
-from echostep_app.team.messages.report import BadReportError, Motion, Presence, check_name, decode, encode, schema
+from echostep_app.team.messages.report import (
+    BadReportError,
+    Motion,
+    Presence,
+    ReportedAlarm,
+    check_name,
+    decode,
+    encode,
+    schema,
+)
 from echostep_app.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
 from team.team_reports import NOW, PLAN, POSITION, UNIX, heard, report, said
 
@@ -147,7 +156,7 @@ def test_only_the_commanders_clock_makes_somebody_stale() -> None:
     for k, off_s in enumerate((-86_400.0, 86_400.0, 0.0)):
         name = f"n{k}"
         roster.receive(f"echostep/red/{name}/estimate", encode(report(name, 1, UNIX + off_s)), False, NOW, UNIX)
-    assert {m.state(NOW + 9.0) for m in roster.members(NOW + 9.0)} == {MemberState.TRACKING}
+    assert {m.state(NOW + 1.9) for m in roster.members(NOW + 1.9)} == {MemberState.TRACKING}
     assert {m.state(NOW + 11.0) for m in roster.members(NOW + 11.0)} == {MemberState.STALE}
 
 
@@ -235,14 +244,39 @@ def test_a_narrow_table_drops_columns_and_cuts_no_number(columns: int) -> None:
 
 def test_two_senders_under_one_name_and_run_are_named() -> None:
     roster = heard(said())
-    forged = report(sequence=1 << 40, at_s=UNIX)
-    roster.receive("echostep/red/anna/estimate", encode(forged), False, NOW, UNIX)
-    for k in (1, 2):
-        made = report(sequence=10 + k, at_s=UNIX + k)
+    for k, sequence in enumerate(
+        (1 << 53, 900, 10, 11, 901)
+    ):  # forged: the first, which would make all others old, and the second
+        made = report(sequence=sequence, at_s=UNIX + k)
         roster.receive("echostep/red/anna/estimate", encode(made), False, NOW + k, UNIX + k)
-    (member,) = roster.members(NOW + 2.0)
-    assert roster.rejected["a second sender under one name and run"] == 2
-    assert f"{CONTRADICTION} 2 x" in notes(member, load_plan(PLAN), NOW + 2.0, set())
+    (member,) = roster.members(NOW + 4.0)
+    assert roster.rejected["a second sender under one name and run"] == 3
+    assert f"{CONTRADICTION} 3 x" in notes(member, load_plan(PLAN), NOW + 4.0, set())
+    assert member.missed == 898
+
+
+def test_late_is_not_lost_and_every_age_is_of_the_moment_it_is_shown() -> None:
+    """A call for help comes before the end of a run, and that before silence; a newer report takes the end back."""
+    roster = heard(said(alarm=ReportedAlarm("asking", "no motion", 1, 21.0)))
+    (member,) = roster.members(NOW)
+    words = [(member.state(NOW + s).value, member.late(NOW + s)) for s in (1.9, 2.5, 4.0)]
+    assert words == [("tracking", ""), ("uncertain", "late 2 s"), ("lost", "")]
+    r = member.at(NOW + 4.0)
+    assert (r.position, r.last_place and r.last_place.age_s) == (None, 4.0)
+    assert r.last_place
+    assert r.last_place.radius95_m == pytest.approx(POSITION.radius95_m + 6.0)
+    assert (r.alarm and r.alarm.age_s, r.motion and r.motion.still_s) == (25.0, pytest.approx(4.4))
+    for k in range(1, 4):  # a word that came from lateness holds until reports are in time again
+        roster.receive("echostep/red/anna/estimate", encode(said(sequence=1 + k)), False, NOW + 2.5 * k, UNIX)
+        assert member.state(NOW + 2.5 * k) is MemberState.UNCERTAIN
+    ended, mayday = encode(Presence(1, "0123abcd", "ended")), ReportedAlarm("mayday", "help", 1, 0.0)
+    roster.receive("echostep/red/anna/presence", ended, False, NOW + 8.0, UNIX)
+    assert member.state(NOW + 60.0) is MemberState.ENDED
+    roster.receive("echostep/red/anna/estimate", encode(said(sequence=5)), False, NOW + 60.0, UNIX)
+    assert member.state(NOW + 70.5) is MemberState.STALE
+    roster.receive("echostep/red/anna/estimate", encode(said(sequence=6, alarm=mayday)), False, NOW + 71.0, UNIX)
+    roster.receive("echostep/red/anna/presence", ended, False, NOW + 71.0, UNIX)
+    assert member.state(NOW + 72.0) is MemberState.MAYDAY
 
 
 def test_a_position_that_jumps_is_noted() -> None:

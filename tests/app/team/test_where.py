@@ -108,7 +108,7 @@ def test_its_report_has_no_position_and_the_last_known_one_with_its_age(publishe
     assert (last.position, last.place) == (None, None)
     assert last.last_place
     assert (last.last_place.where, last.last_place.age_s) == ("in Office 1", 40.0)
-    assert last.last_place.radius95_m > 100.0  # 40 s at 1.5 m/s
+    assert last.last_place.radius95_m > 60.0  # 40 s at 1.5 m/s
 
 
 def test_the_commander_reads_where_it_was_and_how_long_ago(published: list[Report], plan: Plan) -> None:

@@ -47,7 +47,6 @@ from echostep_app.team.roster import Member, MemberState, Roster
 LIST_S = 0.5  # between two versions of the list: words are read, not watched
 GONE = "There is no such alarm, mark, wearer or floor any more."
 MOST_EVENTS = 64  # of a wearer's history
-SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
 Key = tuple[str, str, str]  # team, name, run
 
 
@@ -269,8 +268,8 @@ class Operation:
                 followed = self._followed[key] = _Followed(self._next_number)
                 self._next_number += 1
             self._note(followed, m, now_s, unix_s)
-            if m.report.status in SHOWN_STATUS and m.report.position and level_on(self.plan, m) is not None:
-                self._trails.add(followed.number, m.report.position, now_s)
+            if (p := m.at(now_s).position) and level_on(self.plan, m) is not None:
+                self._trails.add(followed.number, p, now_s)
 
     def _note(self, followed: _Followed, m: Member, now_s: float, unix_s: float) -> None:
         """Add a change of state to the history."""
@@ -297,10 +296,10 @@ class Operation:
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")
         for m in members:
-            p, level, followed = m.position(now_s), level_on(self.plan, m), self._followed.get(m.key)
-            if p is None or level is None or followed is None:
+            r, level, followed = m.at(now_s), level_on(self.plan, m), self._followed.get(m.key)
+            if (p := r.last_known) is None or level is None or followed is None:
                 continue
-            claimed = m.report.position is not None  # of a place that was last known nothing is claimed but the place
+            claimed = r.position is not None  # of a place that was last known nothing is claimed but the place
             heading = p.heading_rad if claimed and p.heading_rad is not None else math.nan
             protection = p.protection_m if claimed and p.protection_m is not None else math.nan
             radius = p.radius95_m if claimed else math.nan

@@ -35,13 +35,13 @@ from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
+from echostep_app.team.age import SETTLED_S, span_words
 from echostep_app.wearer.alarm import watch_of
 from echostep_app.wearer.steady_status import SteadyStatus, running_note
 
 # All assumed:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
 RATES_NS = 250_000_000  # time between two measurements of the stream rates
-LOST_AFTER_S = 2.0  # without bytes of the MTx and the board: the position is lost
 STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than the delay of the first steps
 SHOWN_S = 1.5  # an echo line is shown for this long
 OPENING_S = 5.0  # longest wait for a browser that was started
@@ -241,20 +241,21 @@ class LivePage:
         self.mailbox.publish(self._lookahead)
 
     def _scene_without_news(self) -> PageScene:
-        """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and status lost."""
+        """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and the status that follows from it."""
         scene = replace(self._lookahead or self._scene, arrived_ns=self._bytes_arrived_ns)
         if scene.estimate is None:
             return replace(scene, status_text=status_text(None, needs_start=self._tracker.state.waits_for_start))
         age_s = (self._arrived_ns - self._estimate_ns) * 1e-9
-        silent = self._arrived_ns - self._sensors_ns >= LOST_AFTER_S * 1e9
+        silent = self._arrived_ns - self._sensors_ns >= SETTLED_S * 1e9
         if not silent and age_s < STEPLESS_S:
             return scene
         reason = "nothing from the foot" if silent else "no step of the foot"
+        late = scene.estimate.unobserved(scene.estimate.t_s + age_s)
         return replace(
             scene,
-            estimate=scene.estimate.unobserved(scene.estimate.t_s + age_s),
+            estimate=late,
             echo_lines=(),
-            status_text=f"lost: {reason} for {age_s:.0f} s",
+            status_text=f"{late.status.value}: {reason} for {span_words(age_s)}",
             gait="",
             guidance=scene.guidance and scene.guidance.stopped(f"There is {reason}", scene.t_s),
             beacons=tuple(replace(mark, heard=False) for mark in scene.beacons),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -19,8 +18,9 @@ from rich.text import Text
 
 from echostep.plan import NO_PLAN, Plan
 from echostep_app.plan.places.bearing import heading_words
+from echostep_app.team.age import span_words
 from echostep_app.team.cot import alarm_words
-from echostep_app.team.messages.report import WITHOUT_PLAN
+from echostep_app.team.messages.report import WITHOUT_PLAN, Report
 from echostep_app.team.roster import CLOCK_OFF_S, NO_STEP_S, Member, MemberState, Roster, nearest
 
 ALL_COLUMNS_WIDTH = 136  # characters; a narrower terminal shows fewer columns
@@ -29,7 +29,6 @@ LEAST_NOTE = 8  # characters
 EDGES, APART = 2, 2  # characters beside the table and between its columns [rich.box.SIMPLE_HEAD]
 TABLE_LINES = 8  # of a table beside its members: title, head, and what is below it
 LOW_BATTERY_PERCENT = 20
-NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
     "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left", "to start": "right",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
@@ -127,8 +126,8 @@ def rejected(roster: Roster) -> str:
 def _cells(
     m: Member, members: Sequence[Member], plan: Plan, now_s: float, duplicates: set[tuple[str, str]]
 ) -> dict[str, str]:
-    r, p, near = m.report, m.position(now_s), nearest(m, members)
-    from_start = _from_start(m, plan)
+    r, near = m.at(now_s), nearest(m, members, now_s)
+    p, from_start = r.last_known, _from_start(r, plan)
     return {
         "name": f"{r.team}/{r.name}",
         "state": _state(m, now_s),
@@ -152,21 +151,21 @@ def heading_on(plan: Plan, m: Member) -> str:
 
 
 def _state(m: Member, now_s: float) -> str:
-    """State, and for how long no report or no estimate has come."""
-    state, silent_s, p = m.state(now_s), m.silent_s(now_s), m.report.last_known
-    is_current = state not in (MemberState.STALE, MemberState.ENDED) and silent_s <= m.stale_after_s
-    if is_current:
-        return f"{state}, no estimate {p.age_s:.0f} s" if p and p.age_s > NO_ESTIMATE_S else state.value
-    return f"{state} {silent_s:.0f} s" if state is MemberState.STALE else f"{state}, silent {silent_s:.0f} s"
+    """State, and how late a position or how old a report is."""
+    state, silent_s = m.state(now_s), m.silent_s(now_s)
+    if state in (MemberState.STALE, MemberState.ENDED):
+        return f"{state} {span_words(silent_s)}"
+    silence = f"silent {span_words(silent_s)}" if silent_s > m.stale_after_s else m.late(now_s)
+    return ", ".join(filter(None, (state.value, silence)))
 
 
 def notes(m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]]) -> list[str]:
     """Remarks on a member: alarm, name used twice, broken connection, rest, other plan, clock, battery, faults."""
-    remarks, r = [], m.report
+    remarks, r = [], m.at(now_s)
     if m.key[:2] in duplicates:
         remarks.append(f"name used twice (run {r.run})")
     if r.alarm:
-        remarks.append(alarm_words(replace(r.alarm, age_s=r.alarm.age_s + m.silent_s(now_s))))
+        remarks.append(alarm_words(r.alarm))
     if m.presence == "broken":
         remarks.append("connection broke")
     if r.motion and r.motion.still_s > NO_STEP_S:
@@ -202,7 +201,7 @@ def _member(
 ) -> dict[str, Any]:
     import msgspec
 
-    near = nearest(m, members)
+    near, r = nearest(m, members, now_s), m.at(now_s)
     return {
         "team": m.report.team,
         "name": m.report.name,
@@ -211,19 +210,19 @@ def _member(
         "stale": m.silent_s(now_s) > m.stale_after_s or m.presence == "broken",
         "presence": m.presence,
         "remembered": m.retained,
-        "radius95_m": p.radius95_m if (p := m.position(now_s)) else None,
+        "radius95_m": r.last_known and r.last_known.radius95_m,
         "clock_ahead_s": round(m.clock_ahead_s, 3),
         "missed": m.missed,
-        "from_start_m": _from_start(m, plan),
+        "from_start_m": _from_start(r, plan),
         "nearest": {"name": near[1].report.name, "distance_m": near[0]} if near else None,
         "notes": notes(m, plan, now_s, duplicates),
         "report": msgspec.to_builtins(m.report),
     }
 
 
-def _from_start(m: Member, plan: Plan) -> float | None:
+def _from_start(r: Report, plan: Plan) -> float | None:
     """Straight distance from the plan's start, m; None on another floor or without a start."""
-    p = m.report.position
+    p = r.position
     if p is None or plan.start is None or p.floor != plan.start.level:
         return None
     return math.hypot(p.x_m - plan.start.x_m, p.y_m - plan.start.y_m)

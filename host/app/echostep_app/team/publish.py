@@ -29,6 +29,7 @@ from echostep_app.board.faults.health import all_findings
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
+from echostep_app.team.age import aged, no_better
 from echostep_app.team.cot import StreamTransport, UdpTransport
 from echostep_app.team.endpoint import BROKERS, Endpoint, Outlet
 from echostep_app.team.georeference import GroundPlane
@@ -41,7 +42,7 @@ from echostep_app.team.messages.report import (
     StreamReport,
     printable,
 )
-from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
+from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport
 from echostep_app.wearer.alarm import AlarmWatch, watch_of
 from echostep_app.wearer.steady_status import SteadyStatus
 
@@ -97,7 +98,7 @@ class Publishing:
             if estimate.claims_place:
                 self._known = report.position
             else:
-                report = without_place(report, self._last_place(estimate.t_s))
+                report = no_better(replace(report, position=None, last_place=self._last_place(estimate.t_s)), "lost")
             recorded, tilt_deg = (
                 self._recorded_at(estimate.t_s),
                 reported_tilt_deg(self._watch, self._tracker.front_end.newest_s),
@@ -105,14 +106,13 @@ class Publishing:
             self._offer(replace(report, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
 
     def _last_place(self, t_s: float) -> Position | None:
-        """The last known position with its age; its covariance grows when it is sent."""
-        known = self._known
-        return None if known is None else replace(known, age_s=min(max(t_s - known.t_s, 0.0), 1e9))
+        """The last known position at a later time."""
+        return self._known and aged(self._known, max(t_s - self._known.t_s, 0.0))
 
     @property
     def fault(self) -> str:
-        """Why reports do not go out at present, in a sentence for each endpoint that fails; empty while they do."""
-        return "; ".join(f"{box.name}: {box.fault}" for box in self._outboxes if box.fault)
+        """Why reports do not go out at present, in a sentence for each endpoint that fails; empty while they do. Its address is in the lines."""
+        return "; ".join(f"{box.name.partition(':')[0]}: {box.fault}" for box in self._outboxes if box.fault)
 
     def receipt(self, number: int) -> str:
         """State of delivery of the mayday with this number, in a sentence."""

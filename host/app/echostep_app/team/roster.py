@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
+from echostep_app.team.age import SETTLED_S, late_words, later, no_better
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import (
     BadReportError,
@@ -25,7 +26,8 @@ from echostep_app.team.messages.report import (
     decode,
     decode_presence,
 )
-from echostep_app.team.outbox import aged, without_place
+from echostep_app.team.outbox import MAX_QUEUED
+from echostep_app.wearer.steady_status import HOLD_S
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64
@@ -35,6 +37,8 @@ MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
 MAX_SPEED_M_S = 12.0  # a faster position has jumped: about the top speed of a sprinter
 NO_STEP_S = 30.0  # a longer time without a step is noted
 ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
+STEADY_S = SETTLED_S + HOLD_S  # a position that was late is uncertain for so long after the next report
+MOST_NUMBERS_S = 100.0  # reports that a sender numbers in a second, beside those of a full queue
 CONTRADICTION = "reports of two senders under this name contradict each other"
 MAX_RETAINED_S = 86_400.0  # an older retained report is rejected
 REPLACED_KEPT_S = 60.0  # a silent run is removed after so long when a newer run has the same name
@@ -67,6 +71,8 @@ class Member:
     presence: str = "online"
     missed: int = 0
     notes: Counter[str] = field(default_factory=Counter)
+    _steady_s: float = -math.inf  # when the word may be better than uncertain
+    _at: tuple[float, Report] | None = None  # the report at the time that was asked for last
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -81,26 +87,41 @@ class Member:
         """Seconds since the last report."""
         return max(now_s - self.received_s, 0.0)
 
-    def position(self, now_s: float) -> Position | None:
-        """The last known position; once the report is stale, with a covariance that has grown by the time since then."""
-        p, silent_s = self.report.last_known, self.silent_s(now_s)
-        if p is None or self.presence == "ended" or silent_s <= self.stale_after_s:
-            return p
-        return replace(aged(p, silent_s), age_s=p.age_s + silent_s)
+    def at(self, now_s: float) -> Report:
+        """What the last report says at a time of the commander's clock: every age and every word is of that time."""
+        if self._at is None or self._at[0] != now_s:
+            made = later(self.report, self.silent_s(now_s))
+            self._at = now_s, no_better(made, "uncertain") if now_s < self._steady_s and made.position else made
+        return self._at[1]
+
+    def late(self, now_s: float) -> str:
+        """That the position which is shown is older than it normally is, in words; empty for one that is only the last known."""
+        p = self.at(now_s).position
+        return late_words(p.age_s) if p else ""
+
+    def replace_report(self, report: Report, received_s: float) -> None:
+        """A newer report has come; the lateness of the former one makes it no better than uncertain for STEADY_S."""
+        if later(self.report, max(received_s - self.received_s, 0.0)).status != self.report.status:
+            self._steady_s = received_s + STEADY_S
+        self.report, self.received_s, self._at = report, max(received_s, self.received_s), None
+
+    def contradict(self) -> None:
+        """Note, and raise, that a report of this name and run is another sender's."""
+        self.notes[CONTRADICTION] += 1
+        raise BadReportError("a second sender under one name and run")
 
     def state(self, now_s: float) -> MemberState:
-        """State at a time of the commander's clock."""
+        """State at a time of the commander's clock: a call for help outranks the end of a run, and that a broken connection or silence."""
+        alarm = self.report.alarm
+        if alarm and alarm.kind == "mayday":
+            return MemberState.MAYDAY
+        if alarm and (alarm.kind, alarm.reason) == ("asking", "fall"):
+            return MemberState.ASKED
         if self.presence == "ended":
             return MemberState.ENDED
-        if self.report.alarm and self.report.alarm.kind == "mayday":
-            return MemberState.MAYDAY
-        if self.report.alarm and (self.report.alarm.kind, self.report.alarm.reason) == ("asking", "fall"):
-            return MemberState.ASKED
-        if self.report.status == "lost":
-            return MemberState.LOST
         if self.presence == "broken" or self.silent_s(now_s) > self.stale_after_s:
             return MemberState.STALE
-        return MemberState(self.report.status)
+        return MemberState(self.at(now_s).status)
 
 
 class Roster:
@@ -163,7 +184,7 @@ class Roster:
         self._remove_old(now_s)
 
         def urgency(m: Member) -> tuple[int, float, float, tuple[str, str, str]]:
-            p, state = m.report.position, m.state(now_s)
+            p, state = m.at(now_s).position, m.state(now_s)
             silence = (
                 m.silent_s(now_s)
                 if state in (MemberState.MAYDAY, MemberState.ASKED, MemberState.LOST, MemberState.STALE)
@@ -186,8 +207,7 @@ class Roster:
     def _receive_report(self, team: str, name: str, r: Report, retained: bool, now_s: float, unix_s: float) -> None:
         if (r.team, r.name) != (team, name):
             raise BadReportError("name and topic contradict each other")
-        if r.status == "lost" and r.position is not None:  # of another sender: a place that it knew last, no claim
-            r = without_place(r, r.position)
+        r = no_better(r, r.status)  # a lost one of another sender: a place that it knew last, no claim
         key = (team, name, r.run)
         ahead_s = r.sent_s - unix_s
         if retained and ahead_s < -MAX_RETAINED_S:
@@ -202,24 +222,20 @@ class Roster:
         if retained and r == last.report:
             return  # the broker repeats it after a new connection
         if r.sequence <= last.report.sequence:
-            if (
-                not retained and r.sent_s > last.report.sent_s
-            ):  # a sender's own reports are numbered in the order of time
-                last.notes[CONTRADICTION] += 1
-                raise BadReportError("a second sender under one name and run")
+            if not retained and r.sent_s > last.report.sent_s:  # a sender numbers in the order of time
+                last.contradict()
             raise BadReportError("older than what was heard before")
-        last.missed += r.sequence - last.report.sequence - 1
+        missed = r.sequence - last.report.sequence - 1
+        if missed > MAX_QUEUED + MOST_NUMBERS_S * last.silent_s(now_s):  # forged: the others would be older
+            last.contradict()
+        last.missed += missed
         if not retained and not last.retained and abs(ahead_s - last.clock_ahead_s) > CLOCK_JUMP_S:
             last.notes["clock jumped"] += 1
         if _jumps(last.report.position, r.position):
             last.notes["position jumped"] += 1
-        last.report, last.received_s, last.retained, last.clock_ahead_s = (
-            r,
-            max(received_s, last.received_s),
-            retained,
-            ahead_s,
-        )
-        if last.presence == "broken":
+        last.replace_report(r, received_s)
+        last.retained, last.clock_ahead_s = retained, ahead_s
+        if not retained or last.presence == "broken":
             last.presence = "online"
 
     def _receive_presence(self, team: str, name: str, p: Presence) -> None:
@@ -274,11 +290,11 @@ def _jumps(before: Position | None, after: Position | None) -> bool:
     return distance > reach_m + before.radius95_m + after.radius95_m + 1.0
 
 
-def nearest(member: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
-    """Distance to the closest other member on the same floor, and that member, by their last reports."""
-    if (here := member.report.position) is None:
+def nearest(member: Member, others: Iterable[Member], now_s: float) -> tuple[float, Member] | None:
+    """Distance to the closest other member on the same floor, and that member."""
+    if (here := member.at(now_s).position) is None:
         return None
-    positions = [(o, o.report.position) for o in others if o is not member]
+    positions = [(o, o.at(now_s).position) for o in others if o is not member]
     candidates = [
         (math.hypot(p.x_m - here.x_m, p.y_m - here.y_m), o) for o, p in positions if p and p.floor == here.floor
     ]

@@ -31,11 +31,12 @@ class SteadyStatus:
         return max((each for _, each in self._recent), key=_WORSE.index)
 
     def shown(self, estimate: Estimate, tracker: Tracker) -> Estimate:
-        """The estimate with its steady status; a check-in, or its undoing, is a new beginning."""
+        """The estimate with its steady status, lost where it claims no place; a check-in, or its undoing, is a new beginning."""
         state = tracker.state
         if self._check_ins != (check_ins := (state.check_ins, state.undone)):
             self._recent, self._check_ins = [], check_ins
-        return replace(estimate, status=self.worst(estimate.t_s, estimate.status))
+        status = estimate.status if estimate.claims_place else TrackStatus.LOST
+        return replace(estimate, status=self.worst(estimate.t_s, status))
 
 
 def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from echostep.odometry import AlarmKind, AlarmReason, WearerWatch
+from echostep_app.team.age import span_words
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
@@ -57,7 +58,8 @@ def shown_alarm(
         case AlarmKind.MAYDAY, AlarmReason.HELP:
             return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {receipt}", f"Mayday. {receipt}", times)
         case AlarmKind.MAYDAY, reason:
-            why = f"a fall {age_s:.0f} s ago" if reason is AlarmReason.FALL else f"no motion for {age_s:.0f} s"
+            ago = span_words(age_s)
+            why = f"a fall {ago} ago" if reason is AlarmReason.FALL else f"no motion for {ago}"
             text = f"Mayday: {why}. {receipt}"
             return ShownAlarm(alarm.kind.value, text, f"Mayday. {receipt} Walk, or tap, if you are all right.", times)
     return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

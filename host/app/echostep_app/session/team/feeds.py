@@ -71,13 +71,13 @@ class TeamFeed:
 
     def _place(self, m: Member, now_s: float) -> Teammate | None:
         """Where a member is on this plan; None when it is tracked on another one, which is reported once."""
-        p = m.position(now_s)
-        if p is None or m.report.plan_sha256 != self._plan.digest or not 0 <= p.floor < len(self._plan.levels):
+        r = m.at(now_s)
+        if (p := r.last_known) is None or m.report.plan_sha256 != self._plan.digest or not 0 <= p.floor < len(self._plan.levels):
             if not self._warned:
                 self._warned = True
                 self._print_line(f"{self._name} is tracked on another plan ({m.report.plan}): no way can be found")
             return None
-        last = "" if m.report.position else "last known"
+        last = "" if r.position else "last known"
         words = ", ".join(filter(None, (last, f"on {p.floor_name}" if p.floor_name else "", p.where)))
         # Rounded to centimetres: an unchanged place is passed on once
         return Teammate(
