@@ -21,7 +21,7 @@ from echostep.plan import Plan
 from echostep_app.operation import requests
 from echostep_app.operation.crews import CrewLog
 from echostep_app.operation.distress import ShownDistress, errand_to, shown_distress
-from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, shown_order
+from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, order_over, shown_order
 from echostep_app.operation.trails import Trails
 from echostep_app.operation.words import (
     Shared,
@@ -120,6 +120,8 @@ class Operation:
                 if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload, now_s, unix_s)
             ]
             self._follow(now_s, unix_s)
+            if over := order_over(self._board, self.roster.members(now_s), now_s, unix_s):
+                self._board.answers.append(over)
         return believed
 
     def set_counts(self, received: int, rejected: Mapping[str, int]) -> None:
@@ -205,7 +207,7 @@ class Operation:
             return tuple(self._board.messages)
 
     def take_answers(self) -> list[tuple[str, bytes]]:
-        """Messages for a broker with an older shared state of the commanders; each is given once."""
+        """Messages for the broker: what it has in an older state, which maydays are shown, that an order is over; each is given once."""
         with self._lock:
             answers = list(self._board.answers)
             self._board.answers.clear()
@@ -268,6 +270,7 @@ class Operation:
                 followed = self._followed[key] = _Followed(self._next_number)
                 self._next_number += 1
             self._note(followed, m, now_s, unix_s)
+            self._board.show(alarm_key(m), unix_s)
             if (p := m.at(now_s).position) and level_on(self.plan, m) is not None:
                 self._trails.add(followed.number, p, now_s)
 

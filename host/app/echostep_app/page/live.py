@@ -78,12 +78,11 @@ class LivePage:
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
         self.fault_sources: list[Callable[[], str]] = []  # present faults of the run's output, in words
-        # Name of the acknowledging commander, by the alarm's number
-        self.acknowledged_by: Callable[[int], str | None] | None = None
+        self.answer_to: Callable[[int], str] | None = None  # the commanders' answer to a mayday
         self._owns_server = isinstance(address, Address)
         self.server = PageServer(self.mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)
-        self._rate_meter = StreamRateMeter()
+        self.rate_meter = StreamRateMeter()
         self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of bytes of MTx or board, of the last estimate
         self._arrived_ns = 0
         self._sensors_ns = 0
@@ -191,14 +190,14 @@ class LivePage:
         state = self._tracker.state
         fault = ". ".join(filter(None, (words() for words in self.fault_sources)))
         return {
-            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, fault),
+            "streams": self.rate_meter.measure(self._tracker, self._arrived_ns, fault),
             "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
             "echoes_fit": echoes_fit(state),
             "alarm": shown_alarm(
                 self._watched,
                 self._tracker.front_end.newest_s,
                 receipt_of=self.receipt_of,
-                acknowledged_by=self.acknowledged_by,
+                answer_to=self.answer_to,
             ),
             "met": shown_meeting(state),
         }
@@ -207,6 +206,7 @@ class LivePage:
         """The arrival clock: time of the newest chunk, or the host's clock when a portion is empty."""
         if len(portion.t_arrival_ns):
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
+            self.rate_meter.ports.update(portion.ports)
             if {BOARD, MTX, FOOT} & set(portion.ports):
                 self._sensors_ns = self._arrived_ns
         else:

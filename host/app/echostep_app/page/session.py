@@ -103,6 +103,8 @@ class PageSession(GuardedSocket):
 
     def _take(self, request: CheckIn | Undo | Call) -> str:
         """Queue a check-in, its undoing or a call for the tracker; the reason of a refusal, else empty."""
+        if self._mailbox.summary is not None:
+            return "The run has ended."
         return "" if self._mailbox.add(self._mailbox.check_ins, request) else TOO_BUSY
 
     def _tell_team(self, request: requests.Met | requests.Understood) -> str:

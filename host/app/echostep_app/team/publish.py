@@ -121,7 +121,7 @@ class Publishing:
             for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)
         ]  # fmt: skip
         if Delivery.ACKNOWLEDGED in kinds:
-            return "The team's broker has it; no commander has acknowledged it yet."
+            return "The team's broker has it; no commander's screen shows it yet."
         if kinds:
             return "It was sent; whether it has arrived is not known."
         return f"It has not gone out: {self.fault}." if self.fault else "It is being sent."
@@ -150,12 +150,16 @@ class Publishing:
                 replace(self._empty, alarm=alarm, streams=self._history_before_estimate.streams(self._tracker, now_s))
             )
 
+    def end(self) -> None:
+        """The run is over: the last reports go out, and receivers are told; returns at once."""
+        for outbox in self._outboxes:
+            outbox.begin_close()
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        for outbox in self._outboxes:
-            outbox.begin_close()
+        self.end()
         for outbox in self._outboxes:
             self._print_line(outbox.close())
 
