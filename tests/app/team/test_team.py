@@ -266,9 +266,6 @@ def test_late_is_not_lost_and_every_age_is_of_the_moment_it_is_shown() -> None:
     assert r.last_place
     assert r.last_place.radius95_m == pytest.approx(POSITION.radius95_m + 6.0)
     assert (r.alarm and r.alarm.age_s, r.motion and r.motion.still_s) == (25.0, pytest.approx(4.4))
-    for k in range(1, 4):  # a word that came from lateness holds until reports are in time again
-        roster.receive("echostep/red/anna/estimate", encode(said(sequence=1 + k)), False, NOW + 2.5 * k, UNIX)
-        assert member.state(NOW + 2.5 * k) is MemberState.UNCERTAIN
     ended, mayday = encode(Presence(1, "0123abcd", "ended")), ReportedAlarm("mayday", "help", 1, 0.0)
     roster.receive("echostep/red/anna/presence", ended, False, NOW + 8.0, UNIX)
     assert member.state(NOW + 60.0) is MemberState.ENDED

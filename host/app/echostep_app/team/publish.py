@@ -121,7 +121,7 @@ class Publishing:
             for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)
         ]  # fmt: skip
         if Delivery.ACKNOWLEDGED in kinds:
-            return "The team's broker has it; no commander's screen shows it yet."
+            return "The team's broker has it; no commander has answered yet."
         if kinds:
             return "It was sent; whether it has arrived is not known."
         return f"It has not gone out: {self.fault}." if self.fault else "It is being sent."

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
-from echostep_app.team.age import SETTLED_S, late_words, later, no_better
+from echostep_app.team.age import late_words, later, no_better
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import (
     BadReportError,
@@ -27,7 +27,6 @@ from echostep_app.team.messages.report import (
     decode_presence,
 )
 from echostep_app.team.outbox import MAX_QUEUED
-from echostep_app.wearer.steady_status import HOLD_S
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64
@@ -37,7 +36,6 @@ MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
 MAX_SPEED_M_S = 12.0  # a faster position has jumped: about the top speed of a sprinter
 NO_STEP_S = 30.0  # a longer time without a step is noted
 ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
-STEADY_S = SETTLED_S + HOLD_S  # a position that was late is uncertain for so long after the next report
 MOST_NUMBERS_S = 100.0  # reports that a sender numbers in a second, beside those of a full queue
 CONTRADICTION = "reports of two senders under this name contradict each other"
 MAX_RETAINED_S = 86_400.0  # an older retained report is rejected
@@ -71,7 +69,6 @@ class Member:
     presence: str = "online"
     missed: int = 0
     notes: Counter[str] = field(default_factory=Counter)
-    _steady_s: float = -math.inf  # when the word may be better than uncertain
     _at: tuple[float, Report] | None = None  # the report at the time that was asked for last
 
     @property
@@ -90,20 +87,13 @@ class Member:
     def at(self, now_s: float) -> Report:
         """What the last report says at a time of the commander's clock: every age and every word is of that time."""
         if self._at is None or self._at[0] != now_s:
-            made = later(self.report, self.silent_s(now_s))
-            self._at = now_s, no_better(made, "uncertain") if now_s < self._steady_s and made.position else made
+            self._at = now_s, later(self.report, self.silent_s(now_s))
         return self._at[1]
 
     def late(self, now_s: float) -> str:
         """That the position which is shown is older than it normally is, in words; empty for one that is only the last known."""
         p = self.at(now_s).position
         return late_words(p.age_s) if p else ""
-
-    def replace_report(self, report: Report, received_s: float) -> None:
-        """A newer report has come; the lateness of the former one makes it no better than uncertain for STEADY_S."""
-        if later(self.report, max(received_s - self.received_s, 0.0)).status != self.report.status:
-            self._steady_s = received_s + STEADY_S
-        self.report, self.received_s, self._at = report, max(received_s, self.received_s), None
 
     def contradict(self) -> None:
         """Note, and raise, that a report of this name and run is another sender's."""
@@ -233,7 +223,7 @@ class Roster:
             last.notes["clock jumped"] += 1
         if _jumps(last.report.position, r.position):
             last.notes["position jumped"] += 1
-        last.replace_report(r, received_s)
+        last.report, last.received_s, last._at = r, max(received_s, last.received_s), None
         last.retained, last.clock_ahead_s = retained, ahead_s
         if not retained or last.presence == "broken":
             last.presence = "online"

@@ -123,7 +123,7 @@ class MarkFeed:
         key = team, name, f"{run}-{number}"
         if ack := self._board.acks.get(key):
             return f"{ack.by} has acknowledged it."
-        return "A commander's screen shows it; nobody has acknowledged it yet." if key in self._board.seen else ""
+        return "A commander's screen shows it; no acknowledgement has come yet." if key in self._board.seen else ""
 
     def new_errand(self) -> Errand | None:
         """The errand of this wearer on this plan by a commander, as of the last call of `news`; each errand is given once."""

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT
+"""One fact, one word: three wearers, a commander, a broker that freezes, is slow and dies; at no moment do two surfaces say different things.
+
+In simulated time, a look each quarter of a second: list, summary, details, map, terminal, JSON, TAK's remarks, the wearer's own page and receipt.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from echostep.localization import Estimate, TrackStatus
+from echostep_app.operation.requests import Acknowledge, SetOrder
+from echostep_app.operation.words import COUNTED
+from echostep_app.session.team.feeds import MarkFeed
+from echostep_app.session.team.subscription import TeamSubscription
+from echostep_app.team.age import span_words
+from echostep_app.team.commander import _cells, as_tree
+from echostep_app.team.cot import remarks
+from echostep_app.team.endpoint import parse_outlet
+from echostep_app.team.inbox import ReceivedMessage
+from echostep_app.team.messages.report import Position, Presence, Report, ReportedAlarm, encode
+from echostep_app.team.outbox import HEARTBEAT_S, stamped
+from echostep_app.team.publish import position_of
+from operation.teams import BASE, TOWER, Team
+
+STEP_S = 0.25
+RADIUS = re.compile(r"±([\d.]+) m|within ([\d.]+) m")
+
+
+class Wearer:
+    """Who walks, and sends an estimate each half second; `stopped`: the sensors are silent, heartbeats go on."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.stopped, self.ended, self.alarm = name, False, False, False
+        outlet = parse_outlet(["mqtt://localhost"], name, "red")
+        self.feed = MarkFeed(TeamSubscription(outlet.endpoints[0], print), outlet, BASE.run, TOWER.digest)
+        self.estimate = Estimate(0.0, 12.0, 7.5, 0.01, 0.0, 0.01, 0.0, 0.02, 0, TrackStatus.TRACKING)
+        self._sequence, self._sent_s = 0, -1.0
+
+    def report(self, now_s: float, unix_s: float) -> Report:
+        """What would be sent now."""
+        alarm = ReportedAlarm("mayday", "help", 1, 0.0) if self.alarm else None
+        position = position_of(TOWER.levels, self.estimate)
+        known = replace(BASE, name=self.name, plan_sha256=TOWER.digest, position=position, alarm=alarm)
+        return stamped(known, self._sequence, unix_s, now_s - self.estimate.t_s, 0)
+
+    def sent(self, now_s: float, unix_s: float) -> Iterator[tuple[str, bytes]]:
+        """Its messages of this moment."""
+        if self.ended:
+            return
+        if not self.stopped:
+            self.estimate = replace(self.estimate, t_s=now_s, x_m=12.0 + 0.1 * now_s % 5.0)
+        if now_s - self._sent_s >= (HEARTBEAT_S if self.stopped else 0.5):
+            self._sequence, self._sent_s = self._sequence + 1, now_s
+            yield f"echostep/red/{self.name}/estimate", encode(self.report(now_s, unix_s))
+
+    def end(self) -> tuple[str, bytes]:
+        self.ended = True
+        return f"echostep/red/{self.name}/presence", encode(Presence(1, BASE.run, "ended"))
+
+
+class Wire:
+    """A broker: messages come after `delay_s`; a frozen one holds them, a dead one loses them."""
+
+    def __init__(self) -> None:
+        self.delay_s, self.frozen, self.dead = 0.0, False, False
+        self._waiting: list[tuple[float, str, bytes]] = []
+
+    def put(self, now_s: float, topic: str, payload: bytes) -> None:
+        if not self.dead:
+            self._waiting.append((now_s + self.delay_s, topic, payload))
+
+    def come(self, now_s: float) -> list[tuple[str, bytes]]:
+        come = [] if self.frozen else [one for one in self._waiting if one[0] <= now_s]
+        self._waiting = [one for one in self._waiting if one not in come]
+        return [(topic, payload) for _, topic, payload in come]
+
+
+def position_words(p: Position | None) -> str:
+    return f"{p.radius95_m:.1f}" if p else ""
+
+
+def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
+    """All surfaces, at this moment; a report is so long on the way."""
+    now_s, scene = team.now_s, team.scene()
+    members, plan = team.operation.roster.members(now_s), team.plan
+    tree = {m["name"]: m for m in as_tree(team.operation.roster, plan, now_s)["members"]}
+    places = {row[0]: row[5:] for row in np.frombuffer(scene.places, "<f4").reshape(-1, 7).tolist()}
+    states = [COUNTED[m.state(now_s)] for m in members]
+    counts = ", ".join(f"{states.count(s)} {s}" for s in dict.fromkeys(COUNTED.values()) if s in states)
+    assert scene.summary == f"{len(members)} wearer{'s' * (len(members) != 1)}: {counts}"
+    for m in members:
+        team.operation._changed = True
+        row = next(row for row in team.scene().rows if row.name == m.report.name)
+        r, silent_s, words = m.at(now_s), m.silent_s(now_s), f"{row.name}: {row.words}"
+        p, said = r.last_known, RADIUS.search(row.words)
+        details = team.operation.details(row.id, now_s)
+        assert p
+        assert details
+        facts = {fact.name: fact.value for fact in details.facts}
+        cells = _cells(m, members, plan, now_s, set())
+        assert (
+            row.state
+            == tree[row.name]["state"]
+            == facts["state"]
+            == m.state(now_s).value
+            == re.split("[ ,]", cells["state"])[0]
+        )
+        claims = said is not None  # one and the same everywhere
+        assert (
+            claims == ("last known" not in words) == np.isfinite(places[row.id][0]) == (facts["place"] != "not known")
+        ), words
+        assert (
+            claims
+            == (not cells["where"].startswith("last"))
+            == (r.status != "lost")
+            == ("place not known" not in remarks(r))
+        ), words
+        assert cells["±95% m"] == position_words(p)
+        assert abs((tree[row.name]["radius95_m"] or 0.0) - p.radius95_m) < 1e-9
+        if said:
+            shown_m = float(next(filter(None, said.groups())))
+            assert abs(shown_m - places[row.id][0 if said[1] else 1]) < 0.06, words
+            assert r.status != "tracking" or p.radius95_m <= 1.0, words
+        assert p.age_s >= silent_s - 1e-6, words  # no place is newer than the report that has it
+        known = f"last known {span_words(p.age_s)} ago"
+        assert claims or known in words, words
+        assert claims or known in remarks(r), words
+        assert row.open_alarm == (row.state == "mayday" and not any("acknowledged by" in note for note in row.notes))
+        own = wearers[row.name]
+        assert silent_s or on_the_way_s or r.status == own.report(now_s, team.unix_s).status, words
+        answer = own.feed.answer_to(1)
+        assert "acknowledged it." not in answer or not row.open_alarm, words
+        assert not answer or row.state == "mayday" or not own.alarm, words
+
+
+def test_at_no_moment_two_surfaces_say_different_things(monkeypatch: pytest.MonkeyPatch) -> None:
+    team, wire, wearers = Team(now_s=0.0), Wire(), {name: Wearer(name) for name in ("anna", "bo", "cy")}
+    monkeypatch.setattr("time.time", lambda: team.unix_s)
+    words: dict[str, list[str]] = {name: [] for name in wearers}
+
+    def ask(request: Any) -> None:
+        message = team.operation.act(request, team.unix_s, team.now_s)
+        assert isinstance(message, tuple)
+        wire.put(team.now_s, *message)
+
+    def go(seconds: float) -> None:
+        for _ in range(int(seconds / STEP_S)):
+            team.pass_time(STEP_S)
+            for wearer in wearers.values():
+                for message in wearer.sent(team.now_s, team.unix_s):
+                    wire.put(team.now_s, *message)
+                own = wearer.report(team.now_s, team.unix_s)  # what its own page says: the same word, the same radius
+                shown = wearer.estimate.unobserved(team.now_s)
+                if team.now_s - wearer.estimate.t_s > HEARTBEAT_S and own.last_known:
+                    assert (shown.status.value, shown.ellipse95.major_m) == (
+                        own.status,
+                        pytest.approx(own.last_known.radius95_m),
+                    )
+            for message in (*wire.come(team.now_s), *team.operation.take_answers()):
+                team.put_bytes(*message)
+                for wearer in wearers.values():
+                    if message[0].startswith("echostep-table/"):
+                        wearer.feed._receive(ReceivedMessage(*message, False, team.now_s, team.unix_s))
+            agree(team, wearers, wire.delay_s)
+            for row in team.scene().rows:
+                if words[row.name][-1:] != [row.state]:
+                    words[row.name].append(row.state)
+
+    go(5.0)
+    wearers["bo"].stopped = True  # the sensors fall silent
+    go(6.0)
+    wearers["bo"].stopped = False
+    wire.frozen = True
+    wearers["anna"].alarm = True
+    go(3.0)
+    assert wearers["anna"].feed.answer_to(1) == ""
+    wire.frozen = False
+    go(1.0)
+    assert wearers["anna"].feed.answer_to(1).startswith("A commander's screen shows it")
+    ask(Acknowledge(team.scene().rows[0].id, "Ann"))
+    wire.delay_s = 2.5
+    go(12.0)
+    assert wearers["anna"].feed.answer_to(1) == "Ann has acknowledged it."
+    wire.put(team.now_s, *wearers["cy"].end())
+    go(130.0)
+    ask(SetOrder("commander"))
+    wire.dead = True
+    go(15.0)
+    wire.delay_s, wire.dead = 0.0, False
+    go(5.0)
+    assert {name: one.feed.orders() != () for name, one in wearers.items()} == dict.fromkeys(wearers, True)
+    wearers["anna"].alarm = False
+    go(1.0)
+    for name in ("anna", "bo"):
+        wire.put(team.now_s, *wearers[name].end())
+    go(300.0)
+    assert team.scene().order is None
+    assert not any(one.feed.orders() for one in wearers.values())
+    assert words["bo"][:4] == ["tracking", "uncertain", "lost", "tracking"], words
+    assert words["cy"][-1] == words["anna"][-1] == "ended", words
