@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -278,14 +278,3 @@ def _jumps(before: Position | None, after: Position | None) -> bool:
     distance = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
     reach_m = MAX_SPEED_M_S * max(after.t_s - before.t_s, 0.0)
     return distance > reach_m + before.radius95_m + after.radius95_m + 1.0
-
-
-def nearest(member: Member, others: Iterable[Member], now_s: float) -> tuple[float, Member] | None:
-    """Distance to the closest other member on the same floor, and that member."""
-    if (here := member.at(now_s).position) is None:
-        return None
-    positions = [(o, o.at(now_s).position) for o in others if o is not member]
-    candidates = [
-        (math.hypot(p.x_m - here.x_m, p.y_m - here.y_m), o) for o, p in positions if p and p.floor == here.floor
-    ]
-    return min(candidates, key=lambda pair: pair[0], default=None)
