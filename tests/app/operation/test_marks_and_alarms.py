@@ -18,9 +18,7 @@ from echostep_app.operation.requests import Acknowledge, SetMark, Unmark
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address, PageServer
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team.endpoint import parse_endpoint, parse_outlet
+from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.marks import ALL
 from echostep_app.team.messages.report import ReportedAlarm
@@ -30,7 +28,7 @@ from operation.test_table_page import shot, table
 from page.browser import LOCAL, looking, spot, violations, wait_for
 from page.frames import PLAN as DEMO
 from page.frames import scene
-from team.network import box_to
+from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, report
 from waiting import until
@@ -67,9 +65,7 @@ class Commander:
 def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
-        outlet = parse_outlet([broker.url], "anna", "red")
-        subscription = TeamSubscription(outlet.endpoints[0], print)
-        wearer = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+        subscription, wearer = feed_of(broker.url, "anna")
         subscription.open()
         box = box_to(broker.url)
         box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))

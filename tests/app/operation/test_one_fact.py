@@ -17,20 +17,18 @@ import pytest
 from echostep.localization import Estimate, TrackStatus
 from echostep_app.operation.requests import Acknowledge, SetOrder
 from echostep_app.operation.words import COUNTED
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.age import span_words
 from echostep_app.team.commander import as_tree
 from echostep_app.team.cot import remarks
-from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import Presence, Report, ReportedAlarm, encode
 from echostep_app.team.outbox import HEARTBEAT_S, stamped
 from echostep_app.team.publish import position_of
 from operation.teams import BASE, TOWER, Team
+from team.network import feed_of
 
 STEP_S = 0.25
-RADIUS = re.compile(r"±([\d.]+) m|within ([\d.]+) m")
+RADIUS = re.compile(r"±([\d.]+) m")
 
 
 class Wearer:
@@ -38,8 +36,7 @@ class Wearer:
 
     def __init__(self, name: str) -> None:
         self.name, self.stopped, self.ended, self.alarm = name, False, False, False
-        outlet = parse_outlet(["mqtt://localhost"], name, "red")
-        self.feed = MarkFeed(TeamSubscription(outlet.endpoints[0], print), outlet, BASE.run, TOWER.digest)
+        _, self.feed = feed_of("mqtt://localhost", name)
         self.estimate = Estimate(0.0, 12.0, 7.5, 0.01, 0.0, 0.01, 0.0, 0.02, 0, TrackStatus.TRACKING)
         self._sequence, self._sent_s = 0, -1.0
 
@@ -88,11 +85,11 @@ def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
     members, plan = team.operation.roster.members(now_s), team.plan
     tree = {m["name"]: m for m in as_tree(team.operation.roster, plan, now_s)["members"]}
     places = {row[0]: row[5:] for row in np.frombuffer(scene.places, "<f4").reshape(-1, 7).tolist()}
-    states = [COUNTED[m.state(now_s)] for m in members]
-    counts = ", ".join(f"{states.count(s)} {s}" for s in dict.fromkeys(COUNTED.values()) if s in states)
-    assert scene.summary == f"{len(members)} wearer{'s' * (len(members) != 1)}: {counts}"
+    assert {row.name: row.state for row in scene.rows} == {m.report.name: m.state(now_s).value for m in members}
+    assert sum(map(int, re.findall(r"[:,] (\d+)", scene.summary))) == len(members)
+    assert all(COUNTED[m.state(now_s)] in scene.summary for m in members)
     for m in members:
-        team.operation._changed = True
+        team.operation._changed = True  # or the ages are up to LIST_S old
         row = next(row for row in team.scene().rows if row.name == m.report.name)
         r, silent_s, words = m.at(now_s), m.silent_s(now_s), f"{row.name}: {row.words}"
         p, said = r.last_known, RADIUS.search(row.words)
@@ -106,8 +103,7 @@ def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
         assert claims == (facts["place"] != "not known") == ("place not known" not in remarks(r)), words
         assert abs((tree[row.name]["radius95_m"] or 0.0) - p.radius95_m) < 1e-9
         if said:
-            shown_m = float(next(filter(None, said.groups())))
-            assert abs(shown_m - places[row.id][0 if said[1] else 1]) < 0.06, words
+            assert float(said[1]) == pytest.approx(places[row.id][0], abs=0.06), words
             assert r.status != "tracking" or p.radius95_m <= 1.0, words
         assert p.age_s >= silent_s - 1e-6, words  # no place is newer than the report that has it
         known = f"last known {span_words(p.age_s)} ago"

@@ -9,13 +9,9 @@ from typing import Any
 
 import pytest
 
-from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
 from echostep_app.operation.requests import SetOrder, WriteNote, parse_request
 from echostep_app.session.sinks import mark_sink
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.orders import (
@@ -35,9 +31,9 @@ from operation.test_marks_and_alarms import Commander
 from operation.test_sent import SPEAKS
 from page.browser import HELD_MS, READY, Walk, loaded_page, overflow, wait_for
 from page.web.test_page_sizes import SIZES, UNREACHED
-from team.network import box_to
+from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, report
+from team.team_reports import report
 from waiting import until
 
 TEXT = "document.querySelector('#everybody-text').textContent"
@@ -129,9 +125,8 @@ def test_hostile_orders_are_refused() -> None:
 def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ben, Walk(1.0, 1.0, stands=True) as walk:
-        outlet = parse_outlet([broker.url], "bo", "red")
-        subscription = TeamSubscription(outlet.endpoints[0], print)
-        sink = mark_sink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
+        subscription, feed = feed_of(broker.url, "bo")
+        sink = mark_sink(feed, walk.page)
         subscription.open()
         box = box_to(broker.url, name="bo")
         box.offer(report("bo"))
@@ -180,9 +175,7 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
 
 def test_yesterdays_order_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """A broker keeps what nobody has ended."""
-    outlet = parse_outlet(["mqtt://localhost"], "bo", "red")
-    subscription = TeamSubscription(outlet.endpoints[0], print)
-    feed = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+    _, feed = feed_of("mqtt://localhost", "bo")
     feed._receive(
         ReceivedMessage(*order_message(EVERYBODY, Order(1, OUT, "Ann", 1e9)), retained=True, received_s=0.0, unix_s=1e9)
     )

@@ -47,17 +47,6 @@ def test_nothing_keeps_a_commander_out(browser: Any, look: str, tmp_path: Path) 
     assert beyond == (0, 0)
 
 
-def test_the_list_is_in_words_and_the_most_urgent_comes_first(browser: Any) -> None:
-    with ServedTeam(whole_team()) as served, table(browser, served.page.url, "wide") as page:
-        said = page.evaluate(WORDS)
-        assert said[0].startswith("▲ Finn mayday, ")
-        assert said[1].startswith("✕ Kim lost, ")
-        assert said[2].startswith("◌ Bo silent, ")
-        assert "Finn: mayday" in page.inner_text("#live")
-        assert page.inner_text("#floors button:nth-child(1)").endswith("!")  # one of this floor needs help
-        assert not page.wrong
-
-
 def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: Any) -> None:
     team = whole_team()
     with ServedTeam(team) as served, table(browser, served.page.url, "wide") as page:

@@ -130,18 +130,6 @@ def test_a_name_that_could_confuse_is_refused(text: str) -> None:
         check_name(text)
 
 
-def test_lost_and_stale_come_first() -> None:
-    lost = said("zoe", status="lost", position=replace(POSITION, radius95_m=9.0))
-    unsure = said("bob", status="uncertain", position=replace(POSITION, radius95_m=2.0))
-    roster = heard(said("anna"), unsure, lost, said("waits", status="waiting", position=None))
-    roster.receive("echostep/red/gone/estimate", encode(said("gone")), False, NOW - 30.0, UNIX - 30.0)
-    order = [(m.report.name, m.state(NOW)) for m in roster.members(NOW)]
-    assert order == [
-        ("zoe", MemberState.LOST), ("gone", MemberState.STALE), ("bob", MemberState.UNCERTAIN), ("waits", MemberState.WAITING),
-        ("anna", MemberState.TRACKING),
-    ]  # fmt: skip
-
-
 def test_only_the_commanders_clock_makes_somebody_stale() -> None:
     roster = Roster()
     for k, off_s in enumerate((-86_400.0, 86_400.0, 0.0)):
@@ -192,14 +180,14 @@ def test_a_restarted_tracker_replaces_its_former_run() -> None:
     assert [m.report.run for m in roster.members(NOW + 2.0)] == ["ffffffff"]
 
 
-def test_old_reports_and_clocks_that_jump_are_counted() -> None:
+def test_old_reports_and_those_that_did_not_come_are_counted() -> None:
     roster = heard(said(sequence=4), said(sequence=3), said(sequence=4))
     assert roster.rejected == {"older than what was heard before": 2}
     roster.receive("echostep/red/anna/estimate", encode(said(sequence=4)), True, NOW, UNIX)  # after a new connection
     assert roster.rejected == {"older than what was heard before": 2}
     roster.receive("echostep/red/anna/estimate", encode(report(sequence=8, at_s=UNIX + 3600.0)), False, NOW, UNIX)
     (member,) = roster.members(NOW)
-    assert (member.missed, member.notes["clock jumped"]) == (3, 1)
+    assert member.missed == 3
 
 
 def test_two_senders_under_one_name_and_run_are_named() -> None:
@@ -219,8 +207,7 @@ def test_late_is_not_lost_and_every_age_is_of_the_moment_it_is_shown() -> None:
     """A call for help comes before the end of a run, and that before silence; a newer report takes the end back."""
     roster = heard(said(alarm=ReportedAlarm("asking", "no motion", 1, 21.0)))
     (member,) = roster.members(NOW)
-    words = [(member.state(NOW + s).value, member.late(NOW + s)) for s in (1.9, 2.5, 4.0)]
-    assert words == [("tracking", ""), ("uncertain", "late 2 s"), ("lost", "")]
+    assert [member.state(NOW + s).value for s in (1.9, 2.5, 4.0)] == ["tracking", "uncertain", "lost"]
     r = member.at(NOW + 4.0)
     assert (r.position, r.last_place and r.last_place.age_s) == (None, 4.0)
     assert r.last_place
@@ -236,12 +223,6 @@ def test_late_is_not_lost_and_every_age_is_of_the_moment_it_is_shown() -> None:
     roster.receive("echostep/red/anna/estimate", encode(said(sequence=6, alarm=mayday)), False, NOW + 71.0, UNIX)
     roster.receive("echostep/red/anna/presence", ended, False, NOW + 71.0, UNIX)
     assert member.state(NOW + 72.0) is MemberState.MAYDAY
-
-
-def test_a_position_that_jumps_is_noted() -> None:
-    far = said(sequence=2, position=replace(POSITION, x_m=300.0, t_s=13.0))
-    near = said(sequence=3, position=replace(POSITION, x_m=303.0, t_s=14.0))
-    assert heard(said(), far, near).members(NOW)[0].notes == {"position jumped": 1}
 
 
 def test_strangers_fill_neither_roster_nor_reasons() -> None:

@@ -56,7 +56,8 @@ def shown_distress(
     since = alarm_words(r.alarm) if r.alarm else ""
     if p is None or level_on(plan, m) is None:
         return ShownDistress(where, since, "", ())
-    near = sorted(((_away_m(plan, p, o.at(now_s).position), n, o) for n, o in members if _can_go(o, m, plan, now_s)))
+    ready = [(n, o) for n, o in members if o is not m and o.state(now_s) in ON_DUTY and level_on(plan, o) is not None]
+    near = sorted((_away_m(plan, p, o.at(now_s).position), n, o) for n, o in ready)
     rescuers = tuple(
         ShownRescuer(n, o.report.name, _away_words(p, o.at(now_s).position), _sent_words(m, o, board))
         for _, n, o in near[:MOST_RESCUERS]
@@ -84,11 +85,6 @@ def nearest_stairs(plan: Plan, p: Position) -> str:
         return ""
     _, away_m, name = min(ways)
     return f"{name}, {metres(away_m)}" if away_m > 0.0 else f"on {name}"
-
-
-def _can_go(o: Member, m: Member, plan: Plan, now_s: float) -> bool:
-    """Whether a wearer can be sent to another one: with a position on this plan."""
-    return o is not m and o.state(now_s) in ON_DUTY and level_on(plan, o) is not None
 
 
 def _away_m(plan: Plan, a: Position, b: Position | None) -> float:

@@ -96,6 +96,7 @@ class Operation:
         self._next_number = 1
         self._lock = threading.Lock()
         self._rows: tuple[ShownWearer, ...] = ()
+        self._summary = ""
         self._listed_s = -math.inf
         self._changed = False
 
@@ -231,10 +232,11 @@ class Operation:
         """
         with self._lock:
             members = self.roster.members(now_s)
-            if self._changed or now_s - self._listed_s >= LIST_S:
-                self._list(members, now_s, unix_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
+            if self._changed or words != self._summary or now_s - self._listed_s >= LIST_S:
+                self._list(members, now_s, unix_s)
+            self._summary = words
             link, order = (connected, fault, waiting), shown_order(self._board, members, now_s)
             return TableScene(now_s, unix_s, places, self._rows, words, refused, *link, order, *self._shared)
 

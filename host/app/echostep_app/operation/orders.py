@@ -45,7 +45,8 @@ def shown_order(board: MarkBoard, members: Iterable[Member], now_s: float) -> Sh
     if order is None or order.ended:
         return None
     asked = [m for m in members if m.state(now_s) is not MemberState.ENDED]
-    missing = tuple(m.report.name for m in asked if not _has_understood(board, EVERYBODY, m))
+    found = [(m.report.name, board.order_to(EVERYBODY, m.report.team, m.report.name)) for m in asked]
+    missing = tuple(name for name, one in found if one and not one[1])
     return ShownOrder(order.text, order.by, order.unix_s, len(asked) - len(missing), len(asked), missing)
 
 
@@ -84,8 +85,3 @@ def order_news(before: MarkBoard, board: MarkBoard, m: Member) -> list[str]:
         elif new[1]:
             news.append(f"understood: {new[0].text}")
     return news
-
-
-def _has_understood(board: MarkBoard, kind: str, m: Member) -> bool:
-    found = board.order_to(kind, m.report.team, m.report.name)
-    return found is not None and found[1]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from echostep.plan import Plan
 from echostep_app.operation.orders import order_notes
 from echostep_app.page.elements.marks import ShownMark
-from echostep_app.team.age import span_words
+from echostep_app.team.age import late_words, span_words
 from echostep_app.team.commander import heading_on, notes
 from echostep_app.team.cot import alarm_words
 from echostep_app.team.messages.crews import Crew, crew_of
@@ -136,7 +136,7 @@ def where_words(m: Member, now_s: float) -> tuple[str, ...]:
     r = m.at(now_s)
     if p := r.position:
         sure = f"±{metres(p.radius95_m)}" if p.protection_m is None else f"within {metres(p.protection_m)}"
-        return m.late(now_s), p.floor_name, p.where, sure
+        return late_words(p.age_s), p.floor_name, p.where, sure
     return (f"last known {span_words(p.age_s)} ago", p.floor_name, p.where) if (p := r.last_place) else ()
 
 

@@ -160,8 +160,10 @@ class Outbox:
             return
         self._last = entry
         try:
+            self._sequence += 1
+            age_s, overtaken = time.monotonic() - entry[0], self.counts.overtaken
             with self._answer:
-                delivery = self._transport.send(self._stamped(entry))
+                delivery = self._transport.send(stamped(entry[1], self._sequence, time.time(), age_s, overtaken))
         except OSError:
             if not heartbeat:
                 with self._changed:
@@ -191,12 +193,6 @@ class Outbox:
                 self._queue.popleft()
                 self.counts.overtaken += 1
             return self._queue.popleft(), False
-
-    def _stamped(self, entry: tuple[float, Report]) -> Report:
-        offered_s, report = entry
-        self._sequence += 1
-        age_s = time.monotonic() - offered_s
-        return stamped(report, self._sequence, time.time(), age_s, self.counts.overtaken)
 
     def _over(self) -> bool:
         with self._changed:

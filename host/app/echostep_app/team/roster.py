@@ -15,11 +15,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
-from echostep_app.team.age import late_words, later, no_better
+from echostep_app.team.age import later, no_better
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import (
     BadReportError,
-    Position,
     Presence,
     Report,
     check_name,
@@ -31,9 +30,7 @@ from echostep_app.team.outbox import MAX_QUEUED
 MAX_MEMBERS = 256
 MAX_REASONS = 64
 CLOCK_OFF_S = 5.0  # a larger difference of clocks is noted
-CLOCK_JUMP_S = 5.0  # a larger change of that difference is noted
 MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
-MAX_SPEED_M_S = 12.0  # a faster position has jumped: about the top speed of a sprinter
 NO_STEP_S = 30.0  # a longer time without a step is noted
 ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
 MOST_NUMBERS_S = 100.0  # reports that a sender numbers in a second, beside those of a full queue
@@ -89,11 +86,6 @@ class Member:
         if self._at is None or self._at[0] != now_s:
             self._at = now_s, later(self.report, self.silent_s(now_s))
         return self._at[1]
-
-    def late(self, now_s: float) -> str:
-        """That the position which is shown is older than it normally is, in words; empty for one that is only the last known."""
-        p = self.at(now_s).position
-        return late_words(p.age_s) if p else ""
 
     def contradict(self) -> None:
         """Note, and raise, that a report of this name and run is another sender's."""
@@ -219,10 +211,6 @@ class Roster:
         if missed > MAX_QUEUED + MOST_NUMBERS_S * last.silent_s(now_s):  # forged: the others would be older
             last.contradict()
         last.missed += missed
-        if not retained and not last.retained and abs(ahead_s - last.clock_ahead_s) > CLOCK_JUMP_S:
-            last.notes["clock jumped"] += 1
-        if _jumps(last.report.position, r.position):
-            last.notes["position jumped"] += 1
         last.report, last.received_s, last._at = r, max(received_s, last.received_s), None
         last.retained, last.clock_ahead_s = retained, ahead_s
         if not retained or last.presence == "broken":
@@ -269,12 +257,3 @@ def _check_beacons(name: str, payload: bytes) -> None:
         raise BadReportError("not valid beacons")
     if beacons.name != name:
         raise BadReportError("beacons and topic contradict each other")
-
-
-def _jumps(before: Position | None, after: Position | None) -> bool:
-    """Whether two positions are farther apart than MAX_SPEED_M_S and both 95 % radii allow."""
-    if before is None or after is None or before.floor != after.floor:
-        return False
-    distance = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
-    reach_m = MAX_SPEED_M_S * max(after.t_s - before.t_s, 0.0)
-    return distance > reach_m + before.radius95_m + after.radius95_m + 1.0

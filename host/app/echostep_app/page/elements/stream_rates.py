@@ -42,11 +42,7 @@ class StreamRates:
 
 
 class StreamRateMeter:
-    """Turns counters into rates; call `measure` after each portion.
-
-    `ports`: of the run, or those that a recording has; what there is not, nothing is advised about. `foot`: the name of a foot's sensor of another
-    maker.
-    """
+    """Turns counters into rates; call `measure` after each portion. `ports`: those there are; `foot`: name of another maker's sensor on the foot."""
 
     def __init__(self) -> None:
         self.ports: set[str] = set()
