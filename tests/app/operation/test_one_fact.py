@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -57,27 +58,6 @@ class Wearer:
             self._sequence, self._sent_s = self._sequence + 1, now_s
             yield f"echostep/red/{self.name}/estimate", encode(self.report(now_s, unix_s))
 
-    def end(self) -> tuple[str, bytes]:
-        self.ended = True
-        return f"echostep/red/{self.name}/presence", encode(Presence(1, BASE.run, "ended"))
-
-
-class Wire:
-    """A broker: messages come after `delay_s`; a frozen one holds them, a dead one loses them."""
-
-    def __init__(self) -> None:
-        self.delay_s, self.frozen, self.dead = 0.0, False, False
-        self._waiting: list[tuple[float, str, bytes]] = []
-
-    def put(self, now_s: float, topic: str, payload: bytes) -> None:
-        if not self.dead:
-            self._waiting.append((now_s + self.delay_s, topic, payload))
-
-    def come(self, now_s: float) -> list[tuple[str, bytes]]:
-        come = [] if self.frozen else [one for one in self._waiting if one[0] <= now_s]
-        self._waiting = [one for one in self._waiting if one not in come]
-        return [(topic, payload) for _, topic, payload in come]
-
 
 def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
     """All surfaces, at this moment; a report is so long on the way."""
@@ -118,32 +98,46 @@ def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
 
 
 def test_at_no_moment_two_surfaces_say_different_things(monkeypatch: pytest.MonkeyPatch) -> None:
-    team, wire, wearers = Team(now_s=0.0), Wire(), {name: Wearer(name) for name in ("anna", "bo", "cy")}
+    team, wearers = Team(now_s=0.0), {name: Wearer(name) for name in ("anna", "bo", "cy")}
+    broker = SimpleNamespace(delay_s=0.0, frozen=False, dead=False, waiting=list[tuple[float, str, bytes]]())
     monkeypatch.setattr("time.time", lambda: team.unix_s)
     words: dict[str, list[str]] = {name: [] for name in wearers}
+
+    def put(topic: str, payload: bytes) -> None:
+        if not broker.dead:
+            broker.waiting.append((team.now_s + broker.delay_s, topic, payload))
+
+    def come() -> list[tuple[str, bytes]]:
+        due = [one for one in broker.waiting if one[0] <= team.now_s and not broker.frozen]
+        broker.waiting = [one for one in broker.waiting if one not in due]
+        return [(topic, payload) for _, topic, payload in due]
+
+    def end(name: str) -> None:
+        wearers[name].ended = True
+        put(f"echostep/red/{name}/presence", encode(Presence(1, BASE.run, "ended")))
 
     def ask(request: Any) -> None:
         message = team.operation.act(request, team.unix_s, team.now_s)
         assert isinstance(message, tuple)
-        wire.put(team.now_s, *message)
+        put(*message)
 
     def go(seconds: float) -> None:
         for _ in range(int(seconds / STEP_S)):
             team.pass_time(STEP_S)
             for wearer in wearers.values():
                 for message in wearer.sent(team.now_s, team.unix_s):
-                    wire.put(team.now_s, *message)
+                    put(*message)
                 own = wearer.report(team.now_s, team.unix_s)  # what its own page says: the same word, the same radius
                 shown = wearer.estimate.unobserved(team.now_s)
                 if team.now_s - wearer.estimate.t_s > HEARTBEAT_S and own.last_known:
                     assert shown.status.value == own.status
                     assert shown.ellipse95.major_m == pytest.approx(own.last_known.radius95_m)
-            for message in (*wire.come(team.now_s), *team.operation.take_answers()):
+            for message in (*come(), *team.operation.take_answers()):
                 team.put_bytes(*message)
                 for wearer in wearers.values():
                     if message[0].startswith("echostep-table/"):
                         wearer.feed._receive(ReceivedMessage(*message, False, team.now_s, team.unix_s))
-            agree(team, wearers, wire.delay_s)
+            agree(team, wearers, broker.delay_s)
             for row in team.scene().rows:
                 if words[row.name][-1:] != [row.state]:
                     words[row.name].append(row.state)
@@ -152,29 +146,29 @@ def test_at_no_moment_two_surfaces_say_different_things(monkeypatch: pytest.Monk
     wearers["bo"].stopped = True  # the sensors fall silent
     go(6.0)
     wearers["bo"].stopped = False
-    wire.frozen = True
+    broker.frozen = True
     wearers["anna"].alarm = True
     go(3.0)
     assert wearers["anna"].feed.answer_to(1) == ""
-    wire.frozen = False
+    broker.frozen = False
     go(1.0)
     assert wearers["anna"].feed.answer_to(1).startswith("A commander's screen shows it")
     ask(Acknowledge(team.scene().rows[0].id, "Ann"))
-    wire.delay_s = 2.5
+    broker.delay_s = 2.5
     go(12.0)
     assert wearers["anna"].feed.answer_to(1) == "Ann has acknowledged it."
-    wire.put(team.now_s, *wearers["cy"].end())
+    end("cy")
     go(130.0)
     ask(SetOrder("commander"))
-    wire.dead = True
+    broker.dead = True
     go(15.0)
-    wire.delay_s, wire.dead = 0.0, False
+    broker.delay_s, broker.dead = 0.0, False
     go(5.0)
     assert {name: one.feed.orders() != () for name, one in wearers.items()} == dict.fromkeys(wearers, True)
     wearers["anna"].alarm = False
     go(1.0)
-    for name in ("anna", "bo"):
-        wire.put(team.now_s, *wearers[name].end())
+    end("anna")
+    end("bo")
     go(300.0)
     assert team.scene().order is None
     assert not any(one.feed.orders() for one in wearers.values())

@@ -22,19 +22,17 @@ from echostep_app.team.messages.report import BadReportError, Report, check_name
 from echostep_app.team.outbox import Delivery, Outbox, stamped
 from echostep_app.team.publish import ReportHistory
 from team.team_reports import PLACE, PLAN, POSITION, UNIX, report
-from waiting import PATIENCE_S, ends, until
+from waiting import PATIENCE_S, until
 
 
 class Recorded:
-    """A line that keeps what it is given, or never opens."""
+    """A line that keeps what it is given."""
 
     def __init__(self) -> None:
         self.sent: list[Report] = []
-        self.broken = False
 
     def open(self) -> None:
-        if self.broken:
-            raise ConnectionRefusedError("refused")
+        pass
 
     def send(self, report: Report) -> Delivery:
         self.sent.append(report)
@@ -54,19 +52,6 @@ def test_every_report_goes_out_when_the_line_is_quick(monkeypatch: pytest.Monkey
     assert "500 of 500 reports sent, 0 overtaken" in box.close()
     assert [r.position.t_s for r in line.sent if r.position] == [float(k) for k in range(500)]
     assert [r.sequence for r in line.sent] == list(range(1, 501))
-
-
-@pytest.mark.usefixtures("patient")
-def test_a_line_that_never_opens_does_not_hold_up_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither the time for the last reports nor the pause before the next try is waited for."""
-    monkeypatch.setattr(outbox, "RETRY_PAUSES_S", (10.0 * PATIENCE_S,))
-    line = Recorded()
-    line.broken = True
-    box = Outbox(line, "line", lambda _: None)
-    box.offer(report())
-    said: list[str] = []
-    assert ends(lambda: said.append(box.close()))
-    assert "0 of 1 reports sent, 0 overtaken by newer ones, 1 unsent" in said[0]
 
 
 def test_a_position_is_known_until_it_is_older_than_an_estimate_can_be() -> None:

@@ -43,7 +43,7 @@ from echostep_app.team.messages.report import (
     printable,
 )
 from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport
-from echostep_app.wearer.alarm import AlarmWatch, watch_of
+from echostep_app.wearer.alarm import watch_of
 from echostep_app.wearer.steady_status import SteadyStatus
 
 Source = Literal["live", "replay", "simulated"]
@@ -98,16 +98,12 @@ class Publishing:
             if estimate.claims_place:
                 self._known = report.position
             else:
-                report = no_better(replace(report, position=None, last_place=self._last_place(estimate.t_s)), "lost")
-            recorded, tilt_deg = (
-                self._recorded_at(estimate.t_s),
-                reported_tilt_deg(self._watch, self._tracker.front_end.newest_s),
-            )
+                last = self._known and aged(self._known, max(estimate.t_s - self._known.t_s, 0.0))
+                report = no_better(replace(report, position=None, last_place=last), "lost")
+            tilt_rad = self._watch.trunk_tilt_rad(self._tracker.front_end.newest_s)  # NaN without a sensor
+            tilt_deg = None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
+            recorded = self._recorded_at(estimate.t_s)
             self._offer(replace(report, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
-
-    def _last_place(self, t_s: float) -> Position | None:
-        """The last known position at a later time."""
-        return self._known and aged(self._known, max(t_s - self._known.t_s, 0.0))
 
     @property
     def fault(self) -> str:
@@ -227,12 +223,6 @@ def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
     return ReportedAlarm(
         alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
     )  # NaN before the first samples
-
-
-def reported_tilt_deg(watch: AlarmWatch, now_s: float) -> float | None:
-    """The trunk's tilt in whole degrees; None if the belt has none."""
-    tilt_rad = watch.trunk_tilt_rad(now_s)
-    return None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
 
 
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:

@@ -69,7 +69,7 @@ def shown(page: Any, role: str) -> str:
 
 def dated(page: Any, role: str) -> None:
     """Nothing is shown as of now, and what cannot act is off and says why."""
-    for part in {"wearer": ("#place", "#health"), "commander": ("#summary", "#list li:nth-child(5) .said")}[role]:
+    for part in {"wearer": ("#place",), "commander": ("#summary", "#list li:nth-child(5) .said")}[role]:
         assert " ago: " in page.evaluate(DATED, part), part
     off = {"wearer": "#here", "commander": "#floors button"}[role]
     assert page.evaluate(f"document.querySelector('{off}').disabled")
