@@ -18,13 +18,13 @@ import pytest
 from echostep.localization import Estimate, TrackStatus
 from echostep_app.operation.requests import Acknowledge, SetOrder
 from echostep_app.operation.words import COUNTED
-from echostep_app.team.age import span_words
 from echostep_app.team.commander import as_tree
 from echostep_app.team.cot import remarks
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import Presence, Report, ReportedAlarm, encode
 from echostep_app.team.outbox import HEARTBEAT_S, stamped
 from echostep_app.team.publish import position_of
+from echostep_app.wearer.steady_status import span_words
 from operation.teams import BASE, TOWER, Team
 from team.network import feed_of
 
@@ -42,14 +42,12 @@ class Wearer:
         self._sequence, self._sent_s = 0, -1.0
 
     def report(self, now_s: float, unix_s: float) -> Report:
-        """What would be sent now."""
         alarm = ReportedAlarm("mayday", "help", 1, 0.0) if self.alarm else None
         position = position_of(TOWER.levels, self.estimate)
         known = replace(BASE, name=self.name, plan_sha256=TOWER.digest, position=position, alarm=alarm)
         return stamped(known, self._sequence, unix_s, now_s - self.estimate.t_s, 0)
 
     def sent(self, now_s: float, unix_s: float) -> Iterator[tuple[str, bytes]]:
-        """Its messages of this moment."""
         if self.ended:
             return
         if not self.stopped:

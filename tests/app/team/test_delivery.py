@@ -134,7 +134,6 @@ def test_a_frozen_broker_is_told_within_3_s_and_the_connection_lasts(tmp_path: P
         began_s = time.monotonic()
         box.offer(report())
         assert until(lambda: box.fault.startswith("no answer for ") and not receiver.connected)
-        assert receiver.fault.startswith("no answer for ")
         assert time.monotonic() - began_s < 3.0
         broker.thaw()
         assert until(lambda: not box.fault and receiver.connected and not receiver.fault)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from echostep.plan import Plan
 from echostep_app.operation.orders import order_notes
 from echostep_app.page.elements.marks import ShownMark
-from echostep_app.team.age import late_words, span_words
 from echostep_app.team.commander import heading_on, notes
 from echostep_app.team.cot import alarm_words
 from echostep_app.team.messages.crews import Crew, crew_of
@@ -21,6 +20,7 @@ from echostep_app.team.messages.marks import AlarmKey, MarkBoard
 from echostep_app.team.messages.orders import HOLDS_S
 from echostep_app.team.roster import Member, MemberState
 from echostep_app.wearer.falls import LYING_RAD, UPRIGHT_RAD
+from echostep_app.wearer.steady_status import late_words, span_words
 
 STATES = {
     MemberState.MAYDAY: "mayday", MemberState.ASKED: "asked after a fall",

@@ -35,9 +35,8 @@ from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
-from echostep_app.team.age import SETTLED_S, span_words
 from echostep_app.wearer.alarm import watch_of
-from echostep_app.wearer.steady_status import SteadyStatus, running_note
+from echostep_app.wearer.steady_status import SETTLED_S, SteadyStatus, running_note, span_words
 
 # All assumed:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much

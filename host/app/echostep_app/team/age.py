@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Age: what a position and a report still say some seconds later.
 
-In: positions and reports, seconds since they were true. Out: the same at that time; ages in words. Owns nothing. The one rule that makes a word
+In: positions and reports, seconds since they were true. Out: the same at that time. Owns nothing. The one rule that makes a word
 from radius and age, for reports, TAK and commanders: late is not lost. After SETTLED_S the 95 % radius has grown at WALKER_M_S, and the status is
 that of the radius; `Estimate.unobserved` is the same rule on the wearer's side.
 """
@@ -14,8 +14,8 @@ from echostep.localization import TrackStatus
 from echostep.particles.ellipse import widening_m2
 from echostep.particles.limits import WALKER_M_S
 from echostep_app.team.messages.report import Position, Report
+from echostep_app.wearer.steady_status import SETTLED_S
 
-SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
 LONGEST_S = 1e5  # the radius stops to grow after so long, about a day
 WORSE = ["waiting", *(status.value for status in TrackStatus)]
 
@@ -37,7 +37,7 @@ def later(report: Report, seconds: float) -> Report:
         alarm=alarm and replace(alarm, age_s=alarm.age_s + seconds),
         motion=motion and replace(motion, still_s=motion.still_s + seconds),
     )
-    return no_better(report, TrackStatus.of(position.radius95_m)) if position and late_words(position.age_s) else report
+    return no_better(report, TrackStatus.of(position.radius95_m)) if position and position.age_s > SETTLED_S else report
 
 
 def no_better(report: Report, status: str) -> Report:
@@ -66,13 +66,3 @@ def aged(position: Position, seconds: float) -> Position:
 
 def _walked_m(age_s: float) -> float:
     return WALKER_M_S * min(age_s, LONGEST_S) if age_s > SETTLED_S else 0.0
-
-
-def late_words(age_s: float) -> str:
-    """That a position is older than it normally is: "late 3 s"; else empty."""
-    return f"late {span_words(age_s)}" if age_s > SETTLED_S else ""
-
-
-def span_words(seconds: float) -> str:
-    """A time as text: 3 s, 5 min."""
-    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

@@ -19,12 +19,12 @@ from contextlib import suppress
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
-from echostep_app.team.age import late_words, span_words
 from echostep_app.team.endpoint import Endpoint
 from echostep_app.team.faults import ENDED, opening_words
 from echostep_app.team.messages.report import Report, ReportedAlarm, ReportedPlace
 from echostep_app.team.outbox import Delivery
 from echostep_app.team.tls import tls_context
+from echostep_app.wearer.steady_status import late_words, span_words
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling

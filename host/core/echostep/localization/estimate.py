@@ -112,8 +112,8 @@ class Estimate:
         by_m, radius_m = WALKER_M_S * max(t_s - self.t_s, 0.0), self.ellipse95.major_m
         status = max(self.status, TrackStatus.of(radius_m + by_m), key=list(TrackStatus).index)
         more = widening_m2(radius_m, by_m)
-        grown = {"xx_m2": self.xx_m2 + more, "yy_m2": self.yy_m2 + more, "protection_m": self.protection_m + by_m}
-        return replace(self, t_s=t_s, heading_sd_rad=math.pi, status=status, **grown)
+        grown = replace(self, xx_m2=self.xx_m2 + more, yy_m2=self.yy_m2 + more, protection_m=self.protection_m + by_m)
+        return replace(grown, t_s=t_s, heading_sd_rad=math.pi, status=status)
 
 
 def digest(estimates: Iterable[Estimate]) -> str:

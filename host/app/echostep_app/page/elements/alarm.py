@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from echostep.odometry import AlarmKind, AlarmReason, WearerWatch
-from echostep_app.team.age import span_words
+from echostep_app.wearer.steady_status import span_words
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
