@@ -95,7 +95,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         replay(Path(url), load_plan(plan_path), seconds, views, console)
         return
     endpoint = parse_endpoint(url, BROKERS)
-    operation, inbox = Operation(load_plan(plan_path)), Inbox()
+    operation, inbox = Operation(load_plan(plan_path), all_teams=team is None), Inbox()
     checked = checked_name("--team", team) if team else None
     with ExitStack() as opened:
         recorder = OperationRecorder(out, operation, str(endpoint))

@@ -85,8 +85,9 @@ class _Followed:
 class Operation:
     """`receive` takes an inbox's messages; `scene` gives the present moment."""
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
+    def __init__(self, plan: Plan, *, all_teams: bool = True) -> None:
+        """`all_teams`: it hears of everybody, so it can say when all are out."""
+        self.plan, self._all_teams = plan, all_teams
         self.roster = Roster()
         self.crew_log = CrewLog()
         self._board = MarkBoard()
@@ -121,7 +122,7 @@ class Operation:
                 if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload, now_s, unix_s)
             ]
             self._follow(now_s, unix_s)
-            if over := order_over(self._board, self.roster.members(now_s), now_s, unix_s):
+            if self._all_teams and (over := order_over(self._board, self.roster.members(now_s), now_s, unix_s)):
                 self._board.answers.append(over)
         return believed
 

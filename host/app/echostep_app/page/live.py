@@ -33,6 +33,7 @@ from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
+from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.wearer.alarm import watch_of
@@ -220,8 +221,8 @@ class LivePage:
         if not later or later[-1].t1_s <= self._lookahead_s:
             return
         self._lookahead_s = later[-1].t1_s
-        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place would come to lie in one
-        if is_placed(estimate, self._tracker.plan):
+        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place, or turned nobody knows how, stays
+        if is_placed(estimate, self._tracker.plan) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD:
             moved = extrapolate(estimate, state.last_segment, later)
         if moved.status is not estimate.status:  # it is worse
             self._steady.worst(moved.t_s, moved.status)

@@ -147,9 +147,10 @@ class Publishing:
             )
 
     def end(self) -> None:
-        """The run is over: the last reports go out, and receivers are told; returns at once."""
+        """The run is over: the last reports go out, and receivers are told; returns at once. What does not go out is tried on."""
         for outbox in self._outboxes:
-            outbox.begin_close()
+            if not outbox.fault:
+                outbox.begin_close()
 
     def __enter__(self) -> Self:
         return self
