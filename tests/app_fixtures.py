@@ -35,8 +35,8 @@ def signals_as_they_were() -> Iterator[None]:
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """No report becomes too old to be sent, nor its position lost by its age, however long other programs have the cores."""
-    for name in ("FRESH_S", "SETTLED_S", "CLOSING_S"):
-        monkeypatch.setattr(f"echostep_app.team.outbox.{name}", PATIENCE_S)
+    for name in ("outbox.FRESH_S", "age.SETTLED_S", "outbox.CLOSING_S"):
+        monkeypatch.setattr(f"echostep_app.team.{name}", PATIENCE_S)
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from echostep.plan import Plan
 from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.recorded.record import OperationRecorder
+from echostep_app.operation.recorded.tape import MOST_STEPS, STEP_S
 from echostep_app.page.server import Address
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
@@ -86,10 +87,12 @@ class Team:
         self.on_believed(self.operation.receive(dated, dropped, self.now_s, self.unix_s))
 
     def pass_time(self, seconds: float) -> None:
-        """Nothing is heard for so many seconds."""
-        self.now_s += seconds
-        self.unix_s += seconds
-        self.on_believed(self.operation.receive([], {}, self.now_s, self.unix_s))
+        """Nothing is heard for so many seconds; the operation looks as often as its player."""
+        steps = min(math.ceil(seconds / STEP_S), MOST_STEPS)
+        began_s, began_unix_s = self.now_s, self.unix_s
+        for k in range(1, steps + 1):
+            self.now_s, self.unix_s = began_s + seconds * k / steps, began_unix_s + seconds * k / steps
+            self.on_believed(self.operation.receive([], {}, self.now_s, self.unix_s))
 
     def scene(self, **how: Any) -> TableScene:
         """What a page would be sent."""

@@ -170,11 +170,6 @@ def test_a_commander_with_crews(browser: Any, monkeypatch: pytest.MonkeyPatch, t
         table_of.show()
 
     with table_of, table(browser, table_of.page.url, "wide") as page:
-        page.click("#crews-button")
-        page.fill("#crew-name", "Attack 1")
-        page.fill("#crew-members", "Anna, Eve")
-        page.click("#crew-new button")
-        wait_for(page, "document.querySelector('#hint').textContent.startsWith('Enter your name')")
         page.fill("#me", "Ann")
         for name, members, air in (("Attack 1", "Anna, Eve", "30"), ("Attack 2", "Gil", "12")):
             page.click("#crews-button")

@@ -18,9 +18,7 @@ from echostep_app.operation.requests import Acknowledge, SetMark, Unmark
 from echostep_app.page.elements.marks import ShownMark
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address, PageServer
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team.endpoint import parse_endpoint, parse_outlet
+from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.marks import ALL
 from echostep_app.team.messages.report import ReportedAlarm
@@ -30,7 +28,7 @@ from operation.test_table_page import shot, table
 from page.browser import LOCAL, looking, spot, violations, wait_for
 from page.frames import PLAN as DEMO
 from page.frames import scene
-from team.network import box_to
+from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
 from team.team_reports import PLAN, report
 from waiting import until
@@ -67,9 +65,7 @@ class Commander:
 def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ann, Commander(broker.url) as ben:
-        outlet = parse_outlet([broker.url], "anna", "red")
-        subscription = TeamSubscription(outlet.endpoints[0], print)
-        wearer = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+        subscription, wearer = feed_of(broker.url, "anna")
         subscription.open()
         box = box_to(broker.url)
         box.offer(report("anna", alarm=ReportedAlarm("mayday", "no motion", 1, 31.0)))
@@ -77,12 +73,11 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
         page = table(browser, ann.page.url, "wide")
         page.mouse.click(*spot(page, 20.0, 7.5))
         page.click("#mark-hazard")
-        wait_for(page, "document.querySelector('#hint').textContent.startsWith('Enter your name')")
+        wait_for(page, "document.querySelector('#hint').textContent.startsWith('Signed \"commander\"')")
         page.fill("#me", "Ann")
-        page.click("#mark-hazard")
         assert until(lambda: ann.look().marks and ben.look().marks)
         (mark,) = ben.look().marks
-        assert (mark.mark, mark.by, mark.level) == ("hazard", "Ann", 0)
+        assert (mark.mark, mark.by, mark.level) == ("hazard", "commander", 0)
         assert abs(mark.x_m - 20.0) < 0.2
         heard: list[tuple[ShownMark, ...]] = []
 
@@ -101,10 +96,10 @@ def test_two_commanders_and_a_wearer_have_one_state(browser: Any, tmp_path: Path
 
         def is_told() -> bool:
             wearer.news()
-            return wearer.acknowledged_by(1) == "Ann"
+            return wearer.answer_to(1) == "Ann has acknowledged it."
 
         assert until(is_told)
-        assert wearer.acknowledged_by(2) is None
+        assert wearer.answer_to(2) == ""
         with Commander(broker.url) as late:  # a third one has the same state at once
             assert until(
                 lambda: late.look().marks == (mark,) and late.look().rows and not late.look().rows[0].open_alarm

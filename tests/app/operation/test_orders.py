@@ -9,13 +9,9 @@ from typing import Any
 
 import pytest
 
-from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
 from echostep_app.operation.requests import SetOrder, WriteNote, parse_request
 from echostep_app.session.sinks import mark_sink
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.orders import (
@@ -29,15 +25,15 @@ from echostep_app.team.messages.orders import (
     order_message,
     receipt_message,
 )
-from echostep_app.team.messages.report import BadReportError
-from operation.teams import Team, whole_team
+from echostep_app.team.messages.report import BadReportError, Presence, ReportedAlarm, encode
+from operation.teams import TOWER, Team, place, whole_team
 from operation.test_marks_and_alarms import Commander
 from operation.test_sent import SPEAKS
 from page.browser import HELD_MS, READY, Walk, loaded_page, overflow, wait_for
 from page.web.test_page_sizes import SIZES, UNREACHED
-from team.network import box_to
+from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, report
+from team.team_reports import report
 from waiting import until
 
 TEXT = "document.querySelector('#everybody-text').textContent"
@@ -129,9 +125,8 @@ def test_hostile_orders_are_refused() -> None:
 def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ben, Walk(1.0, 1.0, stands=True) as walk:
-        outlet = parse_outlet([broker.url], "bo", "red")
-        subscription = TeamSubscription(outlet.endpoints[0], print)
-        sink = mark_sink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
+        subscription, feed = feed_of(broker.url, "bo")
+        sink = mark_sink(feed, walk.page)
         subscription.open()
         box = box_to(broker.url, name="bo")
         box.offer(report("bo"))
@@ -139,7 +134,6 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
         how = {"viewport": {"width": 360, "height": 740}}
         wearer = loaded_page(browser, walk.page.url, how, READY, SPEAKS)
         table = loaded_page(browser, ben.page.url, how, "document.querySelectorAll('#list li').length === 1")
-        table.fill("#me", "Ben")
         table.click("#out")
         wait_for(table, "document.querySelector('#hint').textContent === 'Hold Everybody out for a second.'")
         table.click("#out", delay=HELD_MS)
@@ -151,8 +145,10 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
 
         assert until(lambda: exchanged(table, f"{TEXT}.endsWith('understood by 0 of 1. not understood yet: bo')"))
         assert until(lambda: exchanged(wearer, "!document.querySelector('#order').hidden"))
-        assert wearer.inner_text("#order-text") == f"Ben: {OUT}"
-        assert wearer.evaluate("said").count(f"Ben: {OUT}") == 1
+        assert wearer.inner_text("#order-text") == f"commander: {OUT}"
+        assert wearer.evaluate("said").count(f"commander: {OUT}") == 1
+        assert table.inner_text("#hint") == 'Signed "commander": enter your name.'
+        table.fill("#me", "Ben")
         for page in (wearer, table):
             for width, height in SIZES:
                 page.set_viewport_size({"width": width, "height": height})
@@ -179,12 +175,34 @@ def test_everybody_is_ordered_out_and_says_so(browser: Any, tmp_path: Path, monk
 
 def test_yesterdays_order_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """A broker keeps what nobody has ended."""
-    outlet = parse_outlet(["mqtt://localhost"], "bo", "red")
-    subscription = TeamSubscription(outlet.endpoints[0], print)
-    feed = MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest)
+    _, feed = feed_of("mqtt://localhost", "bo")
     feed._receive(
         ReceivedMessage(*order_message(EVERYBODY, Order(1, OUT, "Ann", 1e9)), retained=True, received_s=0.0, unix_s=1e9)
     )
-    for age_s, shown in ((0.9 * HOLDS_S, 1), (1.1 * HOLDS_S, 0)):
+    for age_s, shown in ((30.0, ["Ann"]), (250.0, ["Ann, 4 min ago"]), (1.1 * HOLDS_S, [])):
         monkeypatch.setattr(time, "time", lambda now_s=1e9 + age_s: now_s)
-        assert len(feed.orders()) == shown
+        assert [order.text for order in feed.orders()] == [f"{by}: {OUT}" for by in shown]
+
+
+def test_an_order_is_over_when_all_are_out() -> None:
+    """Of those who had ended before nobody is out by it; a call for help is not out."""
+    team, told = Team(now_s=0.0), list[tuple[str, bytes]]()
+
+    def end(name: str) -> None:
+        team.put_bytes(f"echostep/red/{name}/presence", encode(Presence(1, "0123abcd", "ended")))
+        told.extend(team.operation.take_answers())
+
+    for name in ("Kim", "Bo"):
+        team.hear(name, place(TOWER, 1.0, 1.0, 0))
+    end("Bo")
+    team.pass_time(10.0)
+    carry_out(team, SetOrder("Ann"))
+    team.pass_time(10.0)
+    team.hear("Kim", place(TOWER, 1.0, 1.0, 0), alarm=ReportedAlarm("mayday", "help", 1, 0.0))
+    end("Kim")
+    assert [topic for topic, _ in told] == ["echostep-table/seen/red/Kim/0123abcd-1"]
+    assert team.scene().order
+    team.hear("Kim", place(TOWER, 1.0, 1.0, 0))
+    end("Kim")
+    assert [topic for topic, _ in told[1:]] == [f"echostep-table/order/{EVERYBODY}"]
+    assert team.scene().order is None

@@ -9,18 +9,14 @@ from typing import Any
 
 import pytest
 
-from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
 from echostep_app.session.sinks import mark_sink
-from echostep_app.session.team.feeds import MarkFeed
-from echostep_app.session.team.subscription import TeamSubscription
-from echostep_app.team.endpoint import parse_outlet
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.test_marks_and_alarms import Commander
 from page.browser import READY, Walk, loaded_page, wait_for
-from team.network import box_to
+from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import POSITION, report
 from waiting import until
 
 SPEAKS = "window.said = []; speechSynthesis.speak = (sentence) => window.said.push(sentence.text);"
@@ -33,9 +29,8 @@ WORDS = "Ben sends you to anna, in distress: Ground floor, in Meeting"
 def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker, Commander(broker.url) as ben, Walk(10.0, 1.0, stands=True) as walk:
-        outlet = parse_outlet([broker.url], "bo", "red")
-        subscription = TeamSubscription(outlet.endpoints[0], print)
-        sink = mark_sink(MarkFeed(subscription, outlet, "0123abcd", load_plan(PLAN).digest), walk.page)
+        subscription, feed = feed_of(broker.url, "bo")
+        sink = mark_sink(feed, walk.page)
         subscription.open()
         boxes = [box_to(broker.url, name=name) for name in ("anna", "bo")]
         lying = replace(POSITION, x_m=MEETING_M[0], y_m=MEETING_M[1], where="in Meeting")
@@ -49,8 +44,6 @@ def test_who_is_sent_gets_the_way(browser: Any, tmp_path: Path, monkeypatch: pyt
         table = loaded_page(browser, ben.page.url, how, "document.querySelectorAll('#list li').length === 2")
         table.click("#list li:first-child button")
         wait_for(table, "document.querySelectorAll('#rescuers li').length === 1")
-        table.click("#rescuers button")
-        wait_for(table, "document.querySelector('#hint').textContent.startsWith('Enter your name')")
         table.fill("#me", "Ben")
         table.click("#rescuers button")
 

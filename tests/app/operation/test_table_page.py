@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from operation.teams import TOWER, ServedTeam, place, whole_team
@@ -47,17 +48,6 @@ def test_nothing_keeps_a_commander_out(browser: Any, look: str, tmp_path: Path) 
     assert beyond == (0, 0)
 
 
-def test_the_list_is_in_words_and_the_most_urgent_comes_first(browser: Any) -> None:
-    with ServedTeam(whole_team()) as served, table(browser, served.page.url, "wide") as page:
-        said = page.evaluate(WORDS)
-        assert said[0].startswith("▲ Finn mayday, ")
-        assert said[1].startswith("✕ Kim lost, ")
-        assert said[2].startswith("◌ Bo silent, ")
-        assert "Finn: mayday" in page.inner_text("#live")
-        assert page.inner_text("#floors button:nth-child(1)").endswith("!")  # one of this floor needs help
-        assert not page.wrong
-
-
 def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: Any) -> None:
     team = whole_team()
     with ServedTeam(team) as served, table(browser, served.page.url, "wide") as page:
@@ -67,11 +57,14 @@ def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: An
         wait_for(page, "echostep.scene.level === 1")  # the map went to the floor of this wearer
         page.keyboard.press("Enter")  # the focus is on ✕
         wait_for(page, "document.activeElement.innerText.includes('Anna')")
-        team.hear("Anna", place(TOWER, 7.0, 2.0, 1))
+        for name in ("Anna", "Gil"):
+            team.hear(name, place(TOWER, 7.0, 2.0, 1))  # on one spot: their signs are beside each other
         served.show()
         wait_for(page, "[...echostep.scene.places.values()].some(({ x }) => x === 7)")
         page.mouse.click(*spot(page, 7.0, 2.0))
         wait_for(page, "document.querySelector('#who').textContent.includes('Anna')")
+        page.mouse.click(*np.add(spot(page, 7.0, 2.0), (16.0, -28.0)).tolist())
+        wait_for(page, "document.querySelector('#who').textContent.includes('Gil')")
         assert not page.wrong
 
 

@@ -17,7 +17,6 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.places.bearing import heading_words
 from echostep_app.plan.places.globe import globe_of, utm_band, utm_zone
-from echostep_app.team.commander import table
 from echostep_app.team.messages.report import encode
 from echostep_app.team.roster import Roster
 from page.frames import next_frame, opened, scene, served, told
@@ -114,6 +113,3 @@ def test_page_terminal_and_commander_say_the_same() -> None:
         (member,) = roster.members(0.0)
         facts = shown_details(1, member, plan, 0.0, (), set()).facts
         assert [fact.value for fact in facts if fact.name == "heading"] == [expected]
-        (grid, *_) = table(roster, plan, 0.0, connected=True).renderables
-        (looks,) = (column for column in grid.columns if column.header == "looks")  # type: ignore[union-attr]
-        assert [str(cell) for cell in looks.cells] == [expected]

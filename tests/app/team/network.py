@@ -11,7 +11,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from echostep_app.team.endpoint import parse_endpoint
+from echostep_app.session.team.feeds import MarkFeed
+from echostep_app.session.team.subscription import TeamSubscription
+from echostep_app.team.endpoint import parse_endpoint, parse_outlet
 from echostep_app.team.messages.report import Report
 from echostep_app.team.mqtt.publisher import MqttTransport
 from echostep_app.team.outbox import Outbox
@@ -27,6 +29,13 @@ def box_to(url: str, words: list[str] | None = None, name: str = "anna", run: st
     said: list[str] = [] if words is None else words
     endpoint = parse_endpoint(url)
     return Outbox(MqttTransport(endpoint, "red", name, run), str(endpoint), said.append)
+
+
+def feed_of(url: str, name: str) -> tuple[TeamSubscription, MarkFeed]:
+    """What a wearer of team red on the demo's plan hears of the commanders, once the subscription is open."""
+    outlet = parse_outlet([url], name, "red")
+    subscription = TeamSubscription(outlet.endpoints[0], print)
+    return subscription, MarkFeed(subscription, outlet, "0123abcd", report().plan_sha256)
 
 
 @contextmanager

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 
+import paho.mqtt.client as paho
 import pytest
 
 from echostep.plan import load_plan
 from echostep.tracker import Tracker
 from echostep_app.team import inbox
-from echostep_app.team.endpoint import Outlet, parse_endpoint
+from echostep_app.team.endpoint import Endpoint, Outlet, parse_endpoint
 from echostep_app.team.inbox import MOST_TRIES, ListenerThread
 from echostep_app.team.messages.report import ReportedAlarm
-from echostep_app.team.mqtt.broker import UnwantedError
+from echostep_app.team.mqtt import broker as mqtt
+from echostep_app.team.mqtt.broker import RefusedError, UnwantedError
 from echostep_app.team.mqtt.publisher import Listener, MqttTransport
 from echostep_app.team.outbox import Delivery, Outbox
 from echostep_app.team.publish import Publishing
@@ -87,25 +90,69 @@ def test_what_the_rules_allow_is_acknowledged_and_other_topics_are_refused(guard
 
 @needs_broker
 @pytest.mark.process
-def test_an_old_protocol_cannot_refuse_so_its_answer_is_no_receipt(tmp_path: Path) -> None:
+def test_the_version_is_negotiated_anew_and_an_old_one_cannot_refuse_so_its_answer_is_no_receipt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither silence nor an old broker before decides on the version of the next connection."""
+    connect, is_old = mqtt.connect, [False, True, False, False, False]
+
+    def connecting(client: paho.Client, endpoint: Endpoint) -> int:
+        if client.protocol == paho.MQTTv5 and is_old.pop(0):
+            raise RefusedError("an old one")
+        return connect(client, endpoint)
+
+    def kind() -> Delivery:
+        transport.open()
+        made = transport.send(report())
+        transport.close(ended=True)
+        return made
+
+    monkeypatch.setattr(mqtt, "connect", connecting)
     with Broker(tmp_path) as broker:
         transport = MqttTransport(parse_endpoint(broker.url), "red", "anna", "0123abcd")
-        kinds = []
-        for transport._use_mqtt5 in (True, False):
+        assert [kind(), kind(), kind()] == [Delivery.ACKNOWLEDGED, Delivery.SENT, Delivery.ACKNOWLEDGED]
+        broker.freeze()
+        monkeypatch.setattr(mqtt, "ANSWER_S", 0.2)
+        with pytest.raises(TimeoutError, match="does not answer"):
             transport.open()
-            kinds.append(transport.send(report()))
-            transport.close(ended=True)
-    assert kinds == [Delivery.ACKNOWLEDGED, Delivery.SENT]
+        monkeypatch.setattr(mqtt, "ANSWER_S", PATIENCE_S)
+        broker.thaw()
+        assert kind() is Delivery.ACKNOWLEDGED
 
 
-def test_a_mayday_that_cannot_go_out_is_told_first() -> None:
+@needs_broker
+@pytest.mark.process
+def test_a_frozen_broker_is_told_within_3_s_and_the_connection_lasts(tmp_path: Path) -> None:
+    """By those who send, in whose queue reports come, and by those who only hear."""
+    with Broker(tmp_path) as broker:
+        lines: list[str] = []
+        box = box_to(broker.url, lines)
+        receiver = ListenerThread(Listener(parse_endpoint(broker.url), ["echostep/#"], lambda *_: None), lines.append)
+        box.offer(report())
+        assert until(lambda: box.counts.sent and receiver.connected)
+        broker.freeze()
+        began_s = time.monotonic()
+        box.offer(report())
+        assert until(lambda: box.fault.startswith("no answer for ") and not receiver.connected)
+        assert time.monotonic() - began_s < 3.0
+        broker.thaw()
+        assert until(lambda: not box.fault and receiver.connected and not receiver.fault)
+        receiver.close()
+        assert "connection broken 0 times" in box.close()
+    assert lines == []
+
+
+def test_a_mayday_that_cannot_go_out_is_told_first_and_holds_up_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pause before the next try is not waited for."""
+    monkeypatch.setattr("echostep_app.team.outbox.RETRY_PAUSES_S", (10.0 * PATIENCE_S,))
     lines: list[str] = []
     outlet = Outlet((parse_endpoint("mqtt://127.0.0.1:1"),), "anna", "green")
     with Publishing(outlet, Tracker(load_plan(PLAN)), "live", lines.append) as publishing:
         assert until(lambda: publishing.fault)
         publishing._offer(report(alarm=MAYDAY))
-        assert any(line.startswith("MAYDAY has not gone out: mqtt://127.0.0.1:1: ") for line in lines)
-        assert publishing.receipt(1).startswith("It has not gone out: mqtt://127.0.0.1:1: ")
+        assert any(line.startswith("MAYDAY has not gone out: mqtt: connection refused") for line in lines)
+        assert publishing.receipt(1).startswith("It has not gone out: mqtt: connection refused")
+        assert lines[0].startswith("mqtt://127.0.0.1:1: connection refused")
 
 
 def test_a_transport_that_leaves_reports_out_sends_none() -> None:
@@ -138,6 +185,9 @@ class Refusing:
 
     def run_once(self, timeout_s: float) -> None:
         """Nothing comes."""
+
+    def probe(self) -> None:
+        """It answers."""
 
     def publish(self, topic: str, payload: bytes) -> None:
         if payload == self._poison:

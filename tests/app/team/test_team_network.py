@@ -49,10 +49,6 @@ class Ear:
         self.roster.take(*self.inbox.take_all())
         return self.roster.members(time.monotonic())
 
-    def has_all_at(self, t_s: float) -> bool:
-        """Whether the newest position of each of 20 members is of that time."""
-        return [m.report.last_known.t_s for m in self.members() if m.report.last_known] == [t_s] * 20
-
     def only(self) -> Member:
         (member,) = self.members()
         return member
@@ -130,23 +126,6 @@ def test_a_tracker_that_vanishes_leaves_its_last_will_and_its_last_place(tmp_pat
 
 
 @needs_broker
-def test_a_team_of_twenty_is_followed(tmp_path: Path) -> None:
-    with Broker(tmp_path) as broker, listening(broker.url) as feed:
-        boxes = [box_to(broker.url, name=f"n{k:02d}", run=f"{k:08x}") for k in range(20)]
-        for n in range(20):
-            for k, box in enumerate(boxes):
-                box.offer(replace(at(float(n), f"n{k:02d}"), run=f"{k:08x}", status="lost" if k == 7 else "tracking"))
-            assert until(partial(feed.has_all_at, float(n)))
-        first = feed.members()[0]
-        assert (first.report.name, first.state(time.monotonic())) == ("n07", MemberState.LOST)
-        assert sum(m.missed for m in feed.members()) == 0
-        assert feed.roster.rejected == {}
-        for box in boxes:
-            box.begin_close()
-        assert [box.close().split(", ")[0].rpartition(": ")[2] for box in boxes] == ["20 of 20 reports sent"] * 20
-
-
-@needs_broker
 def test_two_trackers_of_one_name_do_not_throw_each_other_out(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker, listening(broker.url) as feed:
         boxes = [box_to(broker.url, run=run) for run in ("11111111", "22222222")]
@@ -177,7 +156,7 @@ def test_tls_with_client_certificates(tmp_path: Path, certificates: Certificates
 
 
 @needs_broker
-def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_path: Path) -> None:
+def test_a_commander_survives_garbage_and_floods(tmp_path: Path) -> None:
     rng = random.Random(5)
     with Broker(tmp_path, "max_queued_messages 100000") as broker, listening(broker.url) as feed:
         enemy = paho.Client(CallbackAPIVersion.VERSION2)
@@ -200,16 +179,10 @@ def test_a_commander_survives_garbage_floods_and_a_restart_of_the_broker(tmp_pat
         assert until(lambda: feed.members() is not None and feed.roster.received > 10_000)
         assert until(lambda: 9500.0 in feed.times)
         assert feed.only().report.name == "anna"
-        broker.stop()
-        assert until(lambda: not feed.reception.connected)
-        broker.start()
-        assert until(lambda: feed.reception.connected)
-        box.offer(at(20_000.0))
-        assert until(lambda: 20_000.0 in feed.times)
         enemy.loop_stop()
         enemy.disconnect()
         box.close()
-    assert feed.words[-1] == "connected again"
+    assert feed.words == []
 
 
 @pytest.mark.slow

@@ -15,13 +15,15 @@ from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.plan import NO_PLAN, Plan, load_plan
 from echostep.tracker import Tracker
 from echostep.walk.table import columns_of
+from echostep_app.operation.operation import Operation
+from echostep_app.operation.terminal import listed
 from echostep_app.operation.words import level_on, shown_wearer
 from echostep_app.output.map_files import TrackOnPlan
 from echostep_app.output.terminal import describe
 from echostep_app.page.elements.taps import Taps
 from echostep_app.printing.console import console
 from echostep_app.session.results import Result, write_results
-from echostep_app.team.commander import notes, table
+from echostep_app.team.commander import notes
 from echostep_app.team.cot import events, remarks
 from echostep_app.team.messages import report as reports
 from echostep_app.team.messages.marks import MarkBoard
@@ -42,10 +44,8 @@ def test_the_commander_and_tak_see_it() -> None:
     assert "; in Office 1, Ground floor; " in remarks(decode(encode(made)))
     roster = Roster()
     roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
-    (grid, *_) = table(roster, load_plan(PLAN), 0.0, connected=True).renderables
-    assert "where" in [column.header for column in grid.columns]  # type: ignore[union-attr]
-    (narrow, *_) = table(roster, load_plan(PLAN), 0.0, connected=True, columns=80).renderables
-    assert "where" not in [column.header for column in narrow.columns]  # type: ignore[union-attr]
+    (member,) = roster.members(0.0)
+    assert ", in Office 1, " in shown_wearer(1, member, load_plan(PLAN), 0.0, set(), MarkBoard()).words
 
 
 def test_an_older_report_has_no_place_in_words_and_a_hostile_one_is_refused() -> None:
@@ -71,11 +71,10 @@ def test_a_wearer_without_a_plan_is_believed_and_meets_nobody_on_a_plan() -> Non
 
 
 def test_the_name_of_a_plan_is_no_markup() -> None:
-    (grid, *_) = table(Roster(), replace(load_plan(PLAN), name="[/wrong]"), 0.0, connected=True).renderables
     console = Console(width=80)
     with console.capture() as shown:
-        console.print(grid)
-    assert "[/wrong]: 0 trackers" in shown.get()
+        console.print(listed(Operation(load_plan(PLAN)).scene(0.0, 0.0), "[/wrong]"))
+    assert "[/wrong]: 0 wearers" in shown.get()
 
 
 UNIX = 1_800_000_000.0
@@ -108,7 +107,7 @@ def test_its_report_has_no_position_and_the_last_known_one_with_its_age(publishe
     assert (last.position, last.place) == (None, None)
     assert last.last_place
     assert (last.last_place.where, last.last_place.age_s) == ("in Office 1", 40.0)
-    assert last.last_place.radius95_m > 100.0  # 40 s at 1.5 m/s
+    assert last.last_place.radius95_m > 60.0  # 40 s at 1.5 m/s
 
 
 def test_the_commander_reads_where_it_was_and_how_long_ago(published: list[Report], plan: Plan) -> None:

@@ -61,4 +61,4 @@ def test_an_estimate_that_a_dropout_has_overtaken_claims_nothing(t_s: float, sta
     assert late.status is status
     assert late.t_s == max(t_s, 33.4)
     assert late.x_m == 12.0
-    assert (late.xx_m2 > 50.0) == (status is TrackStatus.LOST)
+    assert (late.xx_m2 > 15.0) == (status is TrackStatus.LOST)

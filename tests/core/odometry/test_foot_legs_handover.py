@@ -213,7 +213,7 @@ def test_without_foot_and_legs_he_is_lost() -> None:
         np.random.default_rng(1),
     )
     estimates, _ = tracked(lying, without(tuple(lying.chunks()), MTX, 30.0, math.inf))
-    assert all(e.status is TrackStatus.LOST for e in estimates if e.t_s > 32.0)
+    assert all(e.status is TrackStatus.LOST for e in estimates if e.t_s > 34.0)
     assert any(e.t_s > 40.0 for e in estimates)
 
 

@@ -16,17 +16,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group
+from rich.console import Console
 from rich.live import Live
 
 from echostep.plan import load_plan
-from echostep_app.operation.operation import Operation
+from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.recorded.record import OperationRecorder
 from echostep_app.operation.recorded.replay import Views, replay
+from echostep_app.operation.terminal import listed
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.printing.console import console_for_people, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output, output_faults
-from echostep_app.team.commander import table
 from echostep_app.team.endpoint import BROKERS, Endpoint, parse_endpoint
 from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.marks import ALL
@@ -95,7 +95,7 @@ def command(plan_path: Path, url: str, team: str | None, seconds: float | None, 
         replay(Path(url), load_plan(plan_path), seconds, views, console)
         return
     endpoint = parse_endpoint(url, BROKERS)
-    operation, inbox = Operation(load_plan(plan_path)), Inbox()
+    operation, inbox = Operation(load_plan(plan_path), all_teams=team is None), Inbox()
     checked = checked_name("--team", team) if team else None
     with ExitStack() as opened:
         recorder = OperationRecorder(out, operation, str(endpoint))
@@ -153,11 +153,11 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
     pause_s = FRAME_S if page else TABLE_S
     draws, news = console.is_terminal and not views.as_json, FaultNews()
 
-    def drawn(lines: int | None) -> Group:
-        connected = run.receiver.connected
-        return table(
-            operation.roster, operation.plan, time.monotonic(), connected=connected, columns=console.width, lines=lines
-        )
+    def scene() -> TableScene:
+        receiver = run.receiver
+        fault = ". ".join(filter(None, (receiver.fault, news.words())))
+        connected, waiting = receiver.connected, receiver.waiting
+        return operation.scene(time.monotonic(), time.time(), connected=connected, fault=fault, waiting=waiting)
 
     with Live(console=console, auto_refresh=False, transient=False, redirect_stdout=False) as shown:
         try:
@@ -170,17 +170,12 @@ def _follow(run: _Run, page: TablePage | None, console: Console, seconds: float,
                 if page:
                     page.feed.exchange.note_alive()
                     print_notices(page.notices, console)
-                    receiver = run.receiver
-                    fault = ". ".join(filter(None, (receiver.fault, news.words())))
-                    connected, waiting = receiver.connected, receiver.waiting
-                    page.feed.publish(
-                        operation.scene(now_s, time.time(), connected=connected, fault=fault, waiting=waiting)
-                    )
+                    page.feed.publish(scene())
                 if draws and now_s - table_s >= TABLE_S:
                     table_s = now_s
-                    shown.update(drawn(console.height), refresh=True)
+                    shown.update(listed(scene(), operation.plan.name), refresh=True)
         finally:
             if draws:
-                shown.update(drawn(None))
+                shown.update(listed(scene(), operation.plan.name))
             elif not views.as_json:  # in a file the end of the live view would leave its last line open
-                console.print(drawn(None))
+                console.print(listed(scene(), operation.plan.name))

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import shapely
 
 from echostep.plan import Plan
-from echostep_app.operation.words import current_alarm_words, last_place_words, level_on, metres, place_words
+from echostep_app.operation.words import level_on, metres, where_words
 from echostep_app.plan.routing import CLIMB
+from echostep_app.team.cot import alarm_words
 from echostep_app.team.messages.marks import Errand, MarkBoard
 from echostep_app.team.messages.report import Position, printable
 from echostep_app.team.roster import Member, MemberState
@@ -50,15 +51,15 @@ def shown_distress(
     """Of a member with a mayday, or asked after a fall; None for others. `members`: all, with their numbers."""
     if m.state(now_s) not in (MemberState.MAYDAY, MemberState.ASKED):
         return None
-    p = m.position(now_s)
-    words = () if p is None else place_words(p) if m.report.position else last_place_words(p)
-    where = ", ".join(filter(None, words)) or "not known"
-    since = current_alarm_words(m, now_s)
+    r = m.at(now_s)
+    p, where = r.last_known, ", ".join(filter(None, where_words(m, now_s))) or "not known"
+    since = alarm_words(r.alarm) if r.alarm else ""
     if p is None or level_on(plan, m) is None:
         return ShownDistress(where, since, "", ())
-    near = sorted(((_away_m(plan, p, o.position(now_s)), n, o) for n, o in members if _can_go(o, m, plan, now_s)))
+    ready = [(n, o) for n, o in members if o is not m and o.state(now_s) in ON_DUTY and level_on(plan, o) is not None]
+    near = sorted((_away_m(plan, p, o.at(now_s).position), n, o) for n, o in ready)
     rescuers = tuple(
-        ShownRescuer(n, o.report.name, _away_words(p, o.position(now_s)), _sent_words(m, o, board))
+        ShownRescuer(n, o.report.name, _away_words(p, o.at(now_s).position), _sent_words(m, o, board))
         for _, n, o in near[:MOST_RESCUERS]
     )
     return ShownDistress(where, since, nearest_stairs(plan, p), rescuers)
@@ -66,7 +67,7 @@ def shown_distress(
 
 def errand_to(m: Member, plan: Plan, now_s: float, by: str, unix_s: float) -> Errand | None:
     """The errand to a member's last known place; None while it is not known on this plan."""
-    p = m.position(now_s)
+    p = m.at(now_s).last_known
     if p is None or level_on(plan, m) is None:
         return None
     where = printable(", ".join(filter(None, (p.floor_name, p.where))), 200)
@@ -84,11 +85,6 @@ def nearest_stairs(plan: Plan, p: Position) -> str:
         return ""
     _, away_m, name = min(ways)
     return f"{name}, {metres(away_m)}" if away_m > 0.0 else f"on {name}"
-
-
-def _can_go(o: Member, m: Member, plan: Plan, now_s: float) -> bool:
-    """Whether a wearer can be sent to another one: with a position on this plan."""
-    return o is not m and o.state(now_s) in ON_DUTY and level_on(plan, o) is not None and o.report.position is not None
 
 
 def _away_m(plan: Plan, a: Position, b: Position | None) -> float:

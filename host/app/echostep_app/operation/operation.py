@@ -21,7 +21,7 @@ from echostep.plan import Plan
 from echostep_app.operation import requests
 from echostep_app.operation.crews import CrewLog
 from echostep_app.operation.distress import ShownDistress, errand_to, shown_distress
-from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, shown_order
+from echostep_app.operation.orders import NEWER_S, ShownOrder, order_by, order_news, order_over, shown_order
 from echostep_app.operation.trails import Trails
 from echostep_app.operation.words import (
     Shared,
@@ -47,7 +47,6 @@ from echostep_app.team.roster import Member, MemberState, Roster
 LIST_S = 0.5  # between two versions of the list: words are read, not watched
 GONE = "There is no such alarm, mark, wearer or floor any more."
 MOST_EVENTS = 64  # of a wearer's history
-SHOWN_STATUS = {"tracking", "uncertain"}  # of which a trail is drawn
 Key = tuple[str, str, str]  # team, name, run
 
 
@@ -86,8 +85,9 @@ class _Followed:
 class Operation:
     """`receive` takes an inbox's messages; `scene` gives the present moment."""
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
+    def __init__(self, plan: Plan, *, all_teams: bool = True) -> None:
+        """`all_teams`: it hears of everybody, so it can say when all are out."""
+        self.plan, self._all_teams = plan, all_teams
         self.roster = Roster()
         self.crew_log = CrewLog()
         self._board = MarkBoard()
@@ -97,6 +97,7 @@ class Operation:
         self._next_number = 1
         self._lock = threading.Lock()
         self._rows: tuple[ShownWearer, ...] = ()
+        self._summary = ""
         self._listed_s = -math.inf
         self._changed = False
 
@@ -121,6 +122,8 @@ class Operation:
                 if is_shared(m.topic) and self._receive_shared(m.topic or "", m.payload, now_s, unix_s)
             ]
             self._follow(now_s, unix_s)
+            if self._all_teams and (over := order_over(self._board, self.roster.members(now_s), now_s, unix_s)):
+                self._board.answers.append(over)
         return believed
 
     def set_counts(self, received: int, rejected: Mapping[str, int]) -> None:
@@ -206,7 +209,7 @@ class Operation:
             return tuple(self._board.messages)
 
     def take_answers(self) -> list[tuple[str, bytes]]:
-        """Messages for a broker with an older shared state of the commanders; each is given once."""
+        """Messages for the broker: what it has in an older state, which maydays are shown, that an order is over; each is given once."""
         with self._lock:
             answers = list(self._board.answers)
             self._board.answers.clear()
@@ -230,10 +233,11 @@ class Operation:
         """
         with self._lock:
             members = self.roster.members(now_s)
-            if self._changed or now_s - self._listed_s >= LIST_S:
-                self._list(members, now_s, unix_s)
             places, refused = self._places(members, now_s), rejected(self.roster)
             words = summary_words(members, now_s)
+            if self._changed or words != self._summary or now_s - self._listed_s >= LIST_S:
+                self._list(members, now_s, unix_s)
+            self._summary = words
             link, order = (connected, fault, waiting), shown_order(self._board, members, now_s)
             return TableScene(now_s, unix_s, places, self._rows, words, refused, *link, order, *self._shared)
 
@@ -269,8 +273,9 @@ class Operation:
                 followed = self._followed[key] = _Followed(self._next_number)
                 self._next_number += 1
             self._note(followed, m, now_s, unix_s)
-            if m.report.status in SHOWN_STATUS and m.report.position and level_on(self.plan, m) is not None:
-                self._trails.add(followed.number, m.report.position, now_s)
+            self._board.show(alarm_key(m), unix_s)
+            if (p := m.at(now_s).position) and level_on(self.plan, m) is not None:
+                self._trails.add(followed.number, p, now_s)
 
     def _note(self, followed: _Followed, m: Member, now_s: float, unix_s: float) -> None:
         """Add a change of state to the history."""
@@ -297,10 +302,10 @@ class Operation:
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")
         for m in members:
-            p, level, followed = m.position(now_s), level_on(self.plan, m), self._followed.get(m.key)
-            if p is None or level is None or followed is None:
+            r, level, followed = m.at(now_s), level_on(self.plan, m), self._followed.get(m.key)
+            if (p := r.last_known) is None or level is None or followed is None:
                 continue
-            claimed = m.report.position is not None  # of a place that was last known nothing is claimed but the place
+            claimed = r.position is not None  # of a place that was last known nothing is claimed but the place
             heading = p.heading_rad if claimed and p.heading_rad is not None else math.nan
             protection = p.protection_m if claimed and p.protection_m is not None else math.nan
             radius = p.radius95_m if claimed else math.nan

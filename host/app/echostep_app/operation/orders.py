@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from msgspec import structs
+
 from echostep_app.operation import requests
 from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.orders import EVERYBODY, NOTE, Order, order_message
@@ -43,8 +45,21 @@ def shown_order(board: MarkBoard, members: Iterable[Member], now_s: float) -> Sh
     if order is None or order.ended:
         return None
     asked = [m for m in members if m.state(now_s) is not MemberState.ENDED]
-    missing = tuple(m.report.name for m in asked if not _has_understood(board, EVERYBODY, m))
+    found = [(m.report.name, board.order_to(EVERYBODY, m.report.team, m.report.name)) for m in asked]
+    missing = tuple(name for name, one in found if one and not one[1])
     return ShownOrder(order.text, order.by, order.unix_s, len(asked) - len(missing), len(asked), missing)
+
+
+def order_over(board: MarkBoard, members: Iterable[Member], now_s: float, unix_s: float) -> tuple[str, bytes] | None:
+    """The message that ends the order to everybody once all runs have ended, one of them after it; None before. All commanders make the same one."""
+    order = board.orders.get(EVERYBODY)
+    if order is None or order.ended:
+        return None
+    states = [(m.state(now_s), unix_s - m.silent_s(now_s)) for m in members]
+    if not any(heard_s > order.unix_s for _, heard_s in states) or {s for s, _ in states} != {MemberState.ENDED}:
+        return None
+    board.orders[EVERYBODY] = over = structs.replace(order, ended=True, unix_s=order.unix_s + NEWER_S)
+    return order_message(EVERYBODY, over)
 
 
 def order_notes(board: MarkBoard, m: Member) -> list[str]:
@@ -70,8 +85,3 @@ def order_news(before: MarkBoard, board: MarkBoard, m: Member) -> list[str]:
         elif new[1]:
             news.append(f"understood: {new[0].text}")
     return news
-
-
-def _has_understood(board: MarkBoard, kind: str, m: Member) -> bool:
-    found = board.order_to(kind, m.report.team, m.report.name)
-    return found is not None and found[1]

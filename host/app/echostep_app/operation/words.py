@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from echostep.plan import Plan
 from echostep_app.operation.orders import order_notes
@@ -18,9 +18,9 @@ from echostep_app.team.cot import alarm_words
 from echostep_app.team.messages.crews import Crew, crew_of
 from echostep_app.team.messages.marks import AlarmKey, MarkBoard
 from echostep_app.team.messages.orders import HOLDS_S
-from echostep_app.team.messages.report import Position
 from echostep_app.team.roster import Member, MemberState
 from echostep_app.wearer.falls import LYING_RAD, UPRIGHT_RAD
+from echostep_app.wearer.steady_status import late_words, span_words
 
 STATES = {
     MemberState.MAYDAY: "mayday", MemberState.ASKED: "asked after a fall",
@@ -113,9 +113,8 @@ def shown_wearer(
     number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard
 ) -> ShownWearer:
     """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
-    state, p = m.state(now_s), m.position(now_s)
-    place = () if p is None else place_words(p) if m.report.position else last_place_words(p)
-    parts = [STATES[state], *place, heard_words(m.silent_s(now_s))]
+    state = m.state(now_s)
+    parts = [STATES[state], *where_words(m, now_s), heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
     remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
     ack = board.acks.get(key) if key else None
@@ -132,23 +131,18 @@ def shown_wearer(
     )
 
 
-def place_words(p: Position) -> tuple[str, str, str]:
-    """Floor, place on it, and how sure that is: the protection radius where there is one, else the 95 % radius."""
-    if p.protection_m is not None:
-        return p.floor_name, p.where, f"within {metres(p.protection_m)}"
-    return p.floor_name, p.where, f"±{metres(p.radius95_m)}"
-
-
-def last_place_words(p: Position) -> tuple[str, ...]:
-    """Floor and place where a lost wearer was last known to be, and how long ago that was."""
-    return f"last known {p.age_s:.0f} s ago", p.floor_name, p.where
+def where_words(m: Member, now_s: float) -> tuple[str, ...]:
+    """How late a position is, its floor and place, and how sure that is: the protection radius, else that of 95 %; of a lost wearer the last one."""
+    r = m.at(now_s)
+    if p := r.position:
+        sure = f"±{metres(p.radius95_m)}" if p.protection_m is None else f"within {metres(p.protection_m)}"
+        return late_words(p.age_s), p.floor_name, p.where, sure
+    return (f"last known {span_words(p.age_s)} ago", p.floor_name, p.where) if (p := r.last_place) else ()
 
 
 def heard_words(silent_s: float) -> str:
     """Time since a member's last report, in words."""
-    if silent_s < 1.5:
-        return "heard now"
-    return f"heard {silent_s:.0f} s ago" if silent_s < 120.0 else f"heard {silent_s / 60.0:.0f} min ago"
+    return "heard now" if silent_s < 1.5 else f"heard {span_words(silent_s)} ago"
 
 
 def metres(m: float) -> str:
@@ -160,18 +154,19 @@ def shown_details(
     number: int, m: Member, plan: Plan, now_s: float, history: tuple[ShownEvent, ...], duplicates: set[tuple[str, str]]
 ) -> ShownDetails:
     """All fields of the last report, in words."""
-    r, p = m.report, m.position(now_s)
-    rows = [("alarm", current_alarm_words(m, now_s))] if r.alarm else []
+    r = m.at(now_s)
+    p, where = r.last_known, ", ".join(filter(None, where_words(m, now_s)))
+    rows = [("alarm", alarm_words(r.alarm))] if r.alarm else []
     rows += [("state", m.state(now_s).value), ("heard", heard_words(m.silent_s(now_s)).removeprefix("heard "))]
     if p and not r.position:
-        rows += [("place", "not known"), ("last known", ", ".join(filter(None, last_place_words(p))))]
+        rows += [("place", "not known"), ("last known", where)]
     elif p:
         rows += [("floor", f"{p.floor_name} ({100.0 * p.floor_probability:.0f} %)"), ("place", p.where or "not named")]
         rows += [("position", f"x {p.x_m:.1f}, y {p.y_m:.1f} m"), ("95 % within", metres(p.radius95_m))]
         rows += [("safe radius", metres(p.protection_m) if p.protection_m is not None else "none")]
         rows += [("heading", heading_on(plan, m))]
     if r.motion:
-        rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{r.motion.still_s:.0f} s before the report")]
+        rows += [("walked", f"{r.motion.walked_m:.0f} m"), ("last step", f"{span_words(r.motion.still_s)} ago")]
     if r.trunk_tilt_deg is not None:
         rows += [("trunk", tilt_words(r.trunk_tilt_deg))]
     if r.battery_percent is not None:
@@ -181,12 +176,6 @@ def shown_details(
     rows += [("reports missed", str(m.missed)), ("source", r.source), ("run", r.run), ("version", r.version)]
     rows += [("note", note) for note in notes(m, plan, now_s, duplicates)]
     return ShownDetails(number, tuple(ShownFact(name, value) for name, value in rows), history)
-
-
-def current_alarm_words(m: Member, now_s: float) -> str:
-    """A member's alarm at a time of the commander's clock; empty without one."""
-    alarm = m.report.alarm
-    return alarm_words(replace(alarm, age_s=alarm.age_s + m.silent_s(now_s))) if alarm else ""
 
 
 def tilt_words(tilt_deg: float) -> str:

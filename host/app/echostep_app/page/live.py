@@ -33,15 +33,15 @@ from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
+from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.routing import RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.wearer.alarm import watch_of
-from echostep_app.wearer.steady_status import SteadyStatus, running_note
+from echostep_app.wearer.steady_status import SETTLED_S, SteadyStatus, running_note, span_words
 
 # All assumed:
 TRAIL_STEP_M = 0.02  # the trail gets a point when x or y has changed by this much
 RATES_NS = 250_000_000  # time between two measurements of the stream rates
-LOST_AFTER_S = 2.0  # without bytes of the MTx and the board: the position is lost
 STEPLESS_S = 6.0  # with bytes but without an estimate: the same; longer than the delay of the first steps
 SHOWN_S = 1.5  # an echo line is shown for this long
 OPENING_S = 5.0  # longest wait for a browser that was started
@@ -78,12 +78,11 @@ class LivePage:
         self.truth: TruePath | None = None  # shown beside the estimates
         self.receipt_of: Callable[[int], str] | None = None  # delivery of a mayday; None: the run's reports go nowhere
         self.fault_sources: list[Callable[[], str]] = []  # present faults of the run's output, in words
-        # Name of the acknowledging commander, by the alarm's number
-        self.acknowledged_by: Callable[[int], str | None] | None = None
+        self.answer_to: Callable[[int], str] | None = None  # the commanders' answer to a mayday
         self._owns_server = isinstance(address, Address)
         self.server = PageServer(self.mailbox, address) if isinstance(address, Address) else address
         self._model = echo_model(tracker.settings.echo)
-        self._rate_meter = StreamRateMeter()
+        self.rate_meter = StreamRateMeter()
         self._rates_ns = 0  # times of the last measurement of rates, of the last bytes, of bytes of MTx or board, of the last estimate
         self._arrived_ns = 0
         self._sensors_ns = 0
@@ -191,14 +190,14 @@ class LivePage:
         state = self._tracker.state
         fault = ". ".join(filter(None, (words() for words in self.fault_sources)))
         return {
-            "streams": self._rate_meter.measure(self._tracker, self._arrived_ns, fault),
+            "streams": self.rate_meter.measure(self._tracker, self._arrived_ns, fault),
             "undo": None if self._replay else self._undo_clock.offer(state, time.monotonic_ns()),
             "echoes_fit": echoes_fit(state),
             "alarm": shown_alarm(
                 self._watched,
                 self._tracker.front_end.newest_s,
                 receipt_of=self.receipt_of,
-                acknowledged_by=self.acknowledged_by,
+                answer_to=self.answer_to,
             ),
             "met": shown_meeting(state),
         }
@@ -207,6 +206,7 @@ class LivePage:
         """The arrival clock: time of the newest chunk, or the host's clock when a portion is empty."""
         if len(portion.t_arrival_ns):
             self._arrived_ns = max(self._arrived_ns, int(portion.t_arrival_ns[-1]))
+            self.rate_meter.ports.update(portion.ports)
             if {BOARD, MTX, FOOT} & set(portion.ports):
                 self._sensors_ns = self._arrived_ns
         else:
@@ -221,8 +221,8 @@ class LivePage:
         if not later or later[-1].t1_s <= self._lookahead_s:
             return
         self._lookahead_s = later[-1].t1_s
-        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place would come to lie in one
-        if is_placed(estimate, self._tracker.plan):
+        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place, or turned nobody knows how, stays
+        if is_placed(estimate, self._tracker.plan) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD:
             moved = extrapolate(estimate, state.last_segment, later)
         if moved.status is not estimate.status:  # it is worse
             self._steady.worst(moved.t_s, moved.status)
@@ -241,20 +241,21 @@ class LivePage:
         self.mailbox.publish(self._lookahead)
 
     def _scene_without_news(self) -> PageScene:
-        """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and status lost."""
+        """The last scene again; without bytes or steps for too long: the same with a grown ellipse, and the status that follows from it."""
         scene = replace(self._lookahead or self._scene, arrived_ns=self._bytes_arrived_ns)
         if scene.estimate is None:
             return replace(scene, status_text=status_text(None, needs_start=self._tracker.state.waits_for_start))
         age_s = (self._arrived_ns - self._estimate_ns) * 1e-9
-        silent = self._arrived_ns - self._sensors_ns >= LOST_AFTER_S * 1e9
+        silent = self._arrived_ns - self._sensors_ns >= SETTLED_S * 1e9
         if not silent and age_s < STEPLESS_S:
             return scene
         reason = "nothing from the foot" if silent else "no step of the foot"
+        late = scene.estimate.unobserved(scene.estimate.t_s + age_s)
         return replace(
             scene,
-            estimate=scene.estimate.unobserved(scene.estimate.t_s + age_s),
+            estimate=late,
             echo_lines=(),
-            status_text=f"lost: {reason} for {age_s:.0f} s",
+            status_text=f"{late.status.value}: {reason} for {span_words(age_s)}",
             gait="",
             guidance=scene.guidance and scene.guidance.stopped(f"There is {reason}", scene.t_s),
             beacons=tuple(replace(mark, heard=False) for mark in scene.beacons),

@@ -85,10 +85,8 @@ class PageSession(GuardedSocket):
                 offer = self._mailbox.latest.undo if self._mailbox.latest else None
                 is_late = offer is None or offer.undo != request.undo
                 refusal = "It is too late to undo this." if is_late else self._take(request)
-            case Call():
+            case Call() | requests.Understood() | requests.Met():
                 refusal = self._take(request)
-            case requests.Met() | requests.Understood():
-                refusal = self._tell_team(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
             case requests.EndGuidance():
@@ -101,17 +99,21 @@ class PageSession(GuardedSocket):
         self._news.set()
         return refusal
 
-    def _take(self, request: CheckIn | Undo | Call) -> str:
-        """Queue a check-in, its undoing or a call for the tracker; the reason of a refusal, else empty."""
-        return "" if self._mailbox.add(self._mailbox.check_ins, request) else TOO_BUSY
-
-    def _tell_team(self, request: requests.Met | requests.Understood) -> str:
-        """Queue a meeting, or that an order is understood; the reason of a refusal, else empty."""
-        if isinstance(request, requests.Understood):
-            return "" if self._mailbox.add(self._mailbox.understood, request.id) else TOO_BUSY
-        if request.name not in self._mailbox.team:
-            return f"{request.name} is not heard."
-        return "" if self._mailbox.add(self._mailbox.met, request.name) else TOO_BUSY
+    def _take(self, request: CheckIn | Undo | Call | requests.Understood | requests.Met) -> str:
+        """Queue a page's message for the run; the reason of a refusal, else empty."""
+        mailbox = self._mailbox
+        if mailbox.summary is not None:
+            return "The run has ended."
+        match request:
+            case requests.Understood(identity):
+                taken = mailbox.add(mailbox.understood, identity)
+            case requests.Met(name) if name not in mailbox.team:
+                return f"{name} is not heard."
+            case requests.Met(name):
+                taken = mailbox.add(mailbox.met, name)
+            case _:
+                taken = mailbox.add(mailbox.check_ins, request)
+        return "" if taken else TOO_BUSY
 
     async def _tell_run(self) -> None:
         mailbox = self._mailbox

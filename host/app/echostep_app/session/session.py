@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Self
 
 from echostep.errors import EchostepError, words_of
 from echostep.localization import Estimate
-from echostep.ports.chunks import TEAM, Portion
+from echostep.ports.chunks import LINES, TEAM, Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
@@ -62,6 +62,7 @@ import sys
 import webbrowser
 
 PAGE_POLL_S = 0.2
+IMPORTED = "imported from"  # begins the note of a recording of another maker's sensor
 _print_line = partial(console.print, markup=False, highlight=False)
 
 
@@ -138,6 +139,10 @@ class Session:
         )
         print_page(console, page.server.urls)
         page.fault_sources.append(FaultNews().words)
+        page.rate_meter.ports.update(self.arrivals.urls)
+        note = self.recorded.metadata.get("note", "") if self.recorded else ""
+        if LINES in self.arrivals.urls or note.startswith(IMPORTED):
+            page.rate_meter.foot = "foot IMU"
         self.page = opened.enter_context(page)
         self._sinks.append(page_sink(page))
         self.message_sources.append((PERSON, page.pop_check_ins))
@@ -167,7 +172,7 @@ class Session:
         clock = clock_of(self.recorded.metadata) if self.recorded else None
         publishing = Publishing(self.output.outlet, self.tracker, self.source, _print_line, clock)
         self._publishing = opened.enter_context(publishing)
-        self._sinks.append(Sink(lambda _, estimates: publishing.publish(estimates)))
+        self._sinks.append(Sink(lambda _, made: publishing.publish(made), end=lambda _: publishing.end()))
         if self.page:
             self.page.receipt_of = publishing.receipt
             self.page.fault_sources.append(lambda: publishing.fault)
@@ -217,7 +222,7 @@ class Session:
             return
         self.message_sources.append((MEETING, lambda: teammates.meetings(popped(page.mailbox.met))))
         marks = MarkFeed(subscription, outlet, run, plan.digest)
-        page.acknowledged_by = marks.acknowledged_by
+        page.answer_to = marks.answer_to
         self._sinks.append(mark_sink(marks, page))
 
     def track(

@@ -24,6 +24,7 @@ from echostep_app.team.faults import ENDED, opening_words
 from echostep_app.team.messages.report import Report, ReportedAlarm, ReportedPlace
 from echostep_app.team.outbox import Delivery
 from echostep_app.team.tls import tls_context
+from echostep_app.wearer.steady_status import late_words, span_words
 
 FRIEND_ON_FOOT = "a-f-G-U-C"  # friendly, ground, unit, combat
 EMERGENCY, EMERGENCY_OVER = "b-a-o-tbl", "b-a-o-can"  # alarm, other: ATAK's "911 Alert" and its cancelling
@@ -97,10 +98,10 @@ def remarks(report: Report) -> str:
         words.insert(0, alarm_words(report.alarm))
     if p:
         words.append(", ".join(filter(None, (p.where, p.floor_name))))
-        if p.age_s > 1.0:
-            words.append(f"no estimate for {p.age_s:.0f} s")
+        words += filter(None, [late_words(p.age_s)])
     elif last := report.last_place:
-        words.append(", ".join(filter(None, (f"last known {last.age_s:.0f} s ago", last.where, last.floor_name))))
+        known = f"last known {span_words(last.age_s)} ago"
+        words.append(", ".join(filter(None, (known, last.where, last.floor_name))))
     if report.motion:
         words.append(f"still for {report.motion.still_s:.0f} s")
     words.append(f"team {report.team}")
@@ -116,7 +117,7 @@ def alarm_words(alarm: ReportedAlarm) -> str:
     if alarm.kind == "over":
         return f"mayday over for {alarm.age_s:.0f} s"
     kind = "asked whether all is well" if alarm.kind == "asking" else "mayday"
-    age = f"{alarm.age_s:.0f} s" if alarm.age_s < 120.0 else f"{alarm.age_s / 60.0:.0f} min"
+    age = span_words(alarm.age_s)
     why = {"no motion": f"no motion for {age}", "fall": f"fall {age} ago", "help": f"asked for help {age} ago"}
     return f"{kind}: {why[alarm.reason]}"
 

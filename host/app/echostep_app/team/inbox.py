@@ -15,13 +15,14 @@ from typing import NamedTuple, Protocol
 
 from echostep_app.team.faults import in_words
 from echostep_app.team.messages.report import MAX_PAYLOAD
-from echostep_app.team.outbox import RETRY_PAUSES_S
+from echostep_app.team.outbox import RETRY_PAUSES_S, Answer
 
 MESSAGES_PER_TOPIC = 8  # kept until the next look: trackers send about two a second
 MAX_TOPICS = 1024
 MOST_OUTGOING = 64  # messages to the broker that wait
 MOST_TRIES = 5  # to publish a message; one at which the connection breaks every time holds up those behind it
 PACKET_WAIT_S = 0.1
+PROBE_S = 0.5  # between two answers of the broker
 
 
 class ReceivedMessage(NamedTuple):
@@ -76,6 +77,9 @@ class Subscription(Protocol):
     def run_once(self, timeout_s: float) -> None:
         """Wait for one message and pass it on; raises OSError when the connection is broken."""
 
+    def probe(self) -> None:
+        """Wait for an answer; raises OSError."""
+
     def publish(self, topic: str, payload: bytes) -> None:
         """Have the broker keep a message; raises OSError."""
 
@@ -86,12 +90,11 @@ class Subscription(Protocol):
 class ListenerThread:
     """Runs a listener in a thread until `close`, and connects again after each break.
 
-    `fault`: why nothing, or not all, comes and goes at present; empty while all does.
+    `fault`: why nothing, or not all, comes and goes at present; empty while all does. A broker that does not answer is not connected.
     """
 
     def __init__(self, listener: Subscription, print_line: Callable[[str], None]) -> None:
-        self.connected = False
-        self.fault = ""
+        self._connected, self._fault, self._answer = False, "", Answer()
         self._refused = ""  # of the subscription
         self._told: set[str] = set()
         self._failures = 0  # to connect, in a row
@@ -101,6 +104,16 @@ class ListenerThread:
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._work, name="receiver", daemon=True)
         self._thread.start()
+
+    @property
+    def connected(self) -> bool:
+        """Whether messages come and go."""
+        return self._connected and not self._answer.words
+
+    @property
+    def fault(self) -> str:
+        """Why not all of them do."""
+        return self._fault or self._answer.words
 
     def send(self, topic: str, payload: bytes) -> bool:
         """Have the broker keep a message; it waits while the connection is broken. False when too many wait."""
@@ -124,14 +137,16 @@ class ListenerThread:
     def _work(self) -> None:
         while not self._closing.is_set():
             try:
-                self._exchange(self._listener.open())
+                with self._answer:
+                    refused = self._listener.open()
+                self._exchange(refused)
             except Exception as error:  # any fault is printed, then the connection is tried again
                 self._handle_break(error)
         self._listener.close()
 
     def _exchange(self, refused: str) -> None:
         """Pass messages both ways until `close`; `refused`: of the subscription, in words. Raises OSError when the connection breaks."""
-        self.connected = True
+        self._connected, probed_s = True, time.monotonic()
         self._listener.run_once(PACKET_WAIT_S)  # a connection that breaks at once is none
         if self._failures:
             self._print_line("connected again")
@@ -140,21 +155,25 @@ class ListenerThread:
         while not self._closing.is_set():
             while self._outgoing:
                 self._publish_first()
+            if time.monotonic() - probed_s > PROBE_S:
+                with self._answer:
+                    self._listener.probe()
+                probed_s = time.monotonic()
             self._listener.run_once(PACKET_WAIT_S)
 
     def _handle_break(self, error: Exception) -> None:
         """Close the connection and wait before the next try; the first failure of a series is printed."""
-        self.connected = False
+        self._connected = False
         self._listener.close()
-        self.fault = in_words(error)
+        self._fault = in_words(error)
         if self._failures == 0:
-            self._print_line(f"{self.fault}; trying again")
+            self._print_line(f"{self._fault}; trying again")
         self._closing.wait(RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)])
         self._failures += 1
 
     def _tell(self, fault: str) -> None:
         """Keep a fault of a connection that works otherwise; each is printed once."""
-        self.fault = fault
+        self._fault = fault
         if fault and fault not in self._told:
             self._told.add(fault)
             self._print_line(fault)
@@ -164,7 +183,8 @@ class ListenerThread:
         topic, payload = self._outgoing[0]
         self._tries += 1
         try:
-            self._listener.publish(topic, payload)
+            with self._answer:
+                self._listener.publish(topic, payload)
         except PermissionError as error:
             self._drop_first()
             self._tell(f"the broker does not accept what is sent on {topic} ({error}): check its access rules")
@@ -177,7 +197,7 @@ class ListenerThread:
                 )
             raise
         self._drop_first()
-        self.fault = self._refused
+        self._fault = self._refused
 
     def _drop_first(self) -> None:
         self._outgoing.popleft()

@@ -8,7 +8,6 @@ overtaken. The tracker never waits.
 
 from __future__ import annotations
 
-import math
 import random
 import threading
 import time
@@ -19,26 +18,39 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
-from echostep.localization import TrackStatus
-from echostep.particles.ellipse import ellipse95
-from echostep.particles.limits import RISK, WALKER_M_S
 from echostep_app.printing.lines import moment
+from echostep_app.team.age import later
 from echostep_app.team.faults import in_words
-from echostep_app.team.messages.report import Position, Report, ReportedAlarm
-from echostep_app.wearer.steady_status import SteadyStatus
+from echostep_app.team.messages.report import Report, ReportedAlarm
 
 # After so long without a new estimate the last one is sent again, with its age and a larger covariance
 HEARTBEAT_S = 2.0
 VALID_S = 10.0  # a report is valid for so long
 MAX_QUEUED = 1024  # reports
 FRESH_S = 1.0  # a report that has waited longer is dropped when a newer one waits too
-SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
-PROTECTED = math.sqrt(
-    -2.0 * math.log(RISK)
-)  # radius with this risk beyond it, in standard deviations per axis [Rayleigh]
-MAX_WALK_S = 1e5  # the covariance stops to grow after so long, about a day
 RETRY_PAUSES_S = (0.5, 1.0, 2.0, 4.0, 8.0)  # after the first, second, ... failure in a row
 CLOSING_S = 3.0  # for sending the last reports at the end
+LATE_S = 2.0  # an answer that is awaited for longer is told: with the time between two questions this is less than 3 s
+
+
+class Answer:
+    """A context in which the other side's answer is awaited; `words`: that it is late, empty if not, for any thread."""
+
+    def __init__(self) -> None:
+        self._asked_s: float | None = None
+
+    def __enter__(self) -> None:
+        self._asked_s = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        self._asked_s = None
+
+    @property
+    def words(self) -> str:
+        """That the answer is late."""
+        asked_s = self._asked_s
+        waits_s = 0.0 if asked_s is None else time.monotonic() - asked_s
+        return f"no answer for {waits_s:.0f} s" if waits_s > LATE_S else ""
 
 
 class Delivery(StrEnum):
@@ -82,18 +94,23 @@ class Outbox:
 
     def __init__(self, transport: Transport, name: str, print_line: Callable[[str], None]) -> None:
         self.counts = OutboxCounts()
-        self.fault = ""
+        self._fault, self._answer = "", Answer()
         self.delivered: tuple[ReportedAlarm, Delivery] | None = None
         self._transport, self.name, self._print_line = transport, name, print_line
         self._queue: deque[tuple[float, Report]] = deque()
         self._last: tuple[float, Report] | None = None
-        self._sequence, self._steady = 0, SteadyStatus()
+        self._sequence = 0
         self._changed = threading.Condition()
         self._closing_s: float | None = None
         self._open = False
         self._failures = 0
         self._thread = threading.Thread(target=self._work, name=f"outbox {name}", daemon=True)
         self._thread.start()
+
+    @property
+    def fault(self) -> str:
+        """Why reports do not go out at present."""
+        return self._fault or self._answer.words
 
     def offer(self, report: Report) -> None:
         """Append a report to the queue; the oldest is dropped when it is full."""
@@ -128,7 +145,8 @@ class Outbox:
         while not self._over():
             try:
                 if not self._open:
-                    self._transport.open()
+                    with self._answer:
+                        self._transport.open()
                     self._open = True
                 self._send_next()
             except Exception as error:  # any fault is printed, and tracking goes on
@@ -142,7 +160,10 @@ class Outbox:
             return
         self._last = entry
         try:
-            delivery = self._transport.send(self._stamped(entry))
+            self._sequence += 1
+            age_s, overtaken = time.monotonic() - entry[0], self.counts.overtaken
+            with self._answer:
+                delivery = self._transport.send(stamped(entry[1], self._sequence, time.time(), age_s, overtaken))
         except OSError:
             if not heartbeat:
                 with self._changed:
@@ -150,7 +171,7 @@ class Outbox:
             raise
         if self._failures:
             self._print_state("connected again")
-        self.fault, self._failures = "", 0
+        self._fault, self._failures = "", 0
         alarm = entry[1].alarm
         if alarm and delivery is not Delivery.LEFT_OUT:
             self.delivered = alarm, delivery
@@ -173,13 +194,6 @@ class Outbox:
                 self.counts.overtaken += 1
             return self._queue.popleft(), False
 
-    def _stamped(self, entry: tuple[float, Report]) -> Report:
-        offered_s, report = entry
-        self._sequence += 1
-        age_s = time.monotonic() - offered_s
-        made = stamped(report, self._sequence, time.time(), age_s, self.counts.overtaken)
-        return steadied(made, age_s, self._steady)
-
     def _over(self) -> bool:
         with self._changed:
             if self._closing_s is None:
@@ -197,9 +211,9 @@ class Outbox:
         if self._open:
             self.counts.breaks += 1
         self._open = False
-        self.fault = in_words(error)
+        self._fault = in_words(error)
         if self._failures == 0:
-            self._print_state(f"{self.fault}; tracking goes on, trying again")
+            self._print_state(f"{self._fault}; tracking goes on, trying again")
         pause_s = RETRY_PAUSES_S[min(self._failures, len(RETRY_PAUSES_S) - 1)] * random.uniform(0.8, 1.2)
         self._failures += 1
         with self._changed:
@@ -207,50 +221,11 @@ class Outbox:
 
 
 def stamped(report: Report, sequence: int, unix_s: float, age_s: float, overtaken: int) -> Report:
-    """The report with its number, the time of sending, and a covariance that grows with the age of its position, until that is lost."""
-    age_s, last, place = max(age_s, 0.0), report.last_place, report.place
-    position = report.position and aged(report.position, age_s)
-    status = report.status if position is None or age_s <= SETTLED_S else TrackStatus.of(position.radius95_m).value
-    last = position if position and status == "lost" else last and aged(last, last.age_s + age_s)
-    if position and place:
-        place = replace(place, sd_m=(place.sd_m**2 + _walk_variance_m2(age_s)) ** 0.5)
-    report = replace(
-        report,
+    """The report with its number and the time of sending, as old as it is by then."""
+    return replace(
+        later(report, age_s),
         sequence=sequence,
         time=moment(unix_s),
         stale=moment(unix_s + VALID_S),
         superseded=overtaken,
-        status=status,
     )
-    return without_place(report, last) if last else replace(report, position=position, place=place)
-
-
-def steadied(report: Report, age_s: float, steady: SteadyStatus) -> Report:
-    """The report as lost for HOLD_S, in its position's time, after one that was lost by its age; its position is the last one then."""
-    known = report.position or report.last_place
-    if known is None:
-        return report
-    by_age = TrackStatus.LOST if age_s > SETTLED_S else TrackStatus.TRACKING
-    is_lost = steady.worst(known.t_s + known.age_s, by_age) is TrackStatus.LOST
-    return without_place(replace(report, status="lost"), known) if is_lost else report
-
-
-def without_place(report: Report, last: Position | None) -> Report:
-    """The report of a lost wearer: without position and place on Earth, with the last known position."""
-    return replace(report, position=None, place=None, last_place=last)
-
-
-def aged(position: Position, age_s: float) -> Position:
-    """A position `age_s` after its estimate: the covariance grows as if the wearer had walked in any direction at WALKER_M_S."""
-    more = _walk_variance_m2(age_s)
-    xx, yy = position.xx_m2 + more, position.yy_m2 + more
-    radius = ellipse95(xx, position.xy_m2, yy).major_m if more else position.radius95_m
-    protection = position.protection_m
-    if more and protection is not None:
-        protection = min(protection + PROTECTED * math.sqrt(more), 1e7)
-    return replace(position, age_s=age_s, xx_m2=xx, yy_m2=yy, radius95_m=radius, protection_m=protection)
-
-
-def _walk_variance_m2(age_s: float) -> float:
-    """Variance per axis of an unobserved walk of so many seconds, m2; 0 up to SETTLED_S."""
-    return (WALKER_M_S * min(age_s, MAX_WALK_S)) ** 2 if age_s > SETTLED_S else 0.0

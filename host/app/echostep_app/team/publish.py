@@ -29,6 +29,7 @@ from echostep_app.board.faults.health import all_findings
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
+from echostep_app.team.age import aged, no_better
 from echostep_app.team.cot import StreamTransport, UdpTransport
 from echostep_app.team.endpoint import BROKERS, Endpoint, Outlet
 from echostep_app.team.georeference import GroundPlane
@@ -41,8 +42,8 @@ from echostep_app.team.messages.report import (
     StreamReport,
     printable,
 )
-from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport, without_place
-from echostep_app.wearer.alarm import AlarmWatch, watch_of
+from echostep_app.team.outbox import HEARTBEAT_S, Delivery, Outbox, Transport
+from echostep_app.wearer.alarm import watch_of
 from echostep_app.wearer.steady_status import SteadyStatus
 
 Source = Literal["live", "replay", "simulated"]
@@ -97,22 +98,17 @@ class Publishing:
             if estimate.claims_place:
                 self._known = report.position
             else:
-                report = without_place(report, self._last_place(estimate.t_s))
-            recorded, tilt_deg = (
-                self._recorded_at(estimate.t_s),
-                reported_tilt_deg(self._watch, self._tracker.front_end.newest_s),
-            )
+                last = self._known and aged(self._known, max(estimate.t_s - self._known.t_s, 0.0))
+                report = no_better(replace(report, position=None, last_place=last), "lost")
+            tilt_rad = self._watch.trunk_tilt_rad(self._tracker.front_end.newest_s)  # NaN without a sensor
+            tilt_deg = None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
+            recorded = self._recorded_at(estimate.t_s)
             self._offer(replace(report, recorded=recorded, alarm=alarm, trunk_tilt_deg=tilt_deg))
-
-    def _last_place(self, t_s: float) -> Position | None:
-        """The last known position with its age; its covariance grows when it is sent."""
-        known = self._known
-        return None if known is None else replace(known, age_s=min(max(t_s - known.t_s, 0.0), 1e9))
 
     @property
     def fault(self) -> str:
-        """Why reports do not go out at present, in a sentence for each endpoint that fails; empty while they do."""
-        return "; ".join(f"{box.name}: {box.fault}" for box in self._outboxes if box.fault)
+        """Why reports do not go out at present, in a sentence for each endpoint that fails; empty while they do. Its address is in the lines."""
+        return "; ".join(f"{box.name.partition(':')[0]}: {box.fault}" for box in self._outboxes if box.fault)
 
     def receipt(self, number: int) -> str:
         """State of delivery of the mayday with this number, in a sentence."""
@@ -121,7 +117,7 @@ class Publishing:
             for alarm, delivery in (box.delivered,) if (alarm.kind, alarm.number) == ("mayday", number)
         ]  # fmt: skip
         if Delivery.ACKNOWLEDGED in kinds:
-            return "The team's broker has it; no commander has acknowledged it yet."
+            return "The team's broker has it; no commander has answered yet."
         if kinds:
             return "It was sent; whether it has arrived is not known."
         return f"It has not gone out: {self.fault}." if self.fault else "It is being sent."
@@ -150,12 +146,17 @@ class Publishing:
                 replace(self._empty, alarm=alarm, streams=self._history_before_estimate.streams(self._tracker, now_s))
             )
 
+    def end(self) -> None:
+        """The run is over: the last reports go out, and receivers are told; returns at once. What does not go out is tried on."""
+        for outbox in self._outboxes:
+            if not outbox.fault:
+                outbox.begin_close()
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        for outbox in self._outboxes:
-            outbox.begin_close()
+        self.end()
         for outbox in self._outboxes:
             self._print_line(outbox.close())
 
@@ -223,12 +224,6 @@ def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
     return ReportedAlarm(
         alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
     )  # NaN before the first samples
-
-
-def reported_tilt_deg(watch: AlarmWatch, now_s: float) -> float | None:
-    """The trunk's tilt in whole degrees; None if the belt has none."""
-    tilt_rad = watch.trunk_tilt_rad(now_s)
-    return None if math.isnan(tilt_rad) else float(round(math.degrees(tilt_rad)))
 
 
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:

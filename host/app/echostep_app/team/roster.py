@@ -10,31 +10,30 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from echostep.ports.people.team_beacons import BEACONS, parse_team_beacons
+from echostep_app.team.age import later, no_better
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.report import (
     BadReportError,
-    Position,
     Presence,
     Report,
     check_name,
     decode,
     decode_presence,
 )
-from echostep_app.team.outbox import aged, without_place
+from echostep_app.team.outbox import MAX_QUEUED
 
 MAX_MEMBERS = 256
 MAX_REASONS = 64
 CLOCK_OFF_S = 5.0  # a larger difference of clocks is noted
-CLOCK_JUMP_S = 5.0  # a larger change of that difference is noted
 MAX_STALE_S = 60.0  # a report is stale after so long at most, whatever it says
-MAX_SPEED_M_S = 12.0  # a faster position has jumped: about the top speed of a sprinter
 NO_STEP_S = 30.0  # a longer time without a step is noted
 ENDED_KEPT_S = 3600.0  # a run that ended is shown for so long
+MOST_NUMBERS_S = 100.0  # reports that a sender numbers in a second, beside those of a full queue
 CONTRADICTION = "reports of two senders under this name contradict each other"
 MAX_RETAINED_S = 86_400.0  # an older retained report is rejected
 REPLACED_KEPT_S = 60.0  # a silent run is removed after so long when a newer run has the same name
@@ -67,6 +66,7 @@ class Member:
     presence: str = "online"
     missed: int = 0
     notes: Counter[str] = field(default_factory=Counter)
+    _at: tuple[float, Report] | None = None  # the report at the time that was asked for last
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -81,26 +81,29 @@ class Member:
         """Seconds since the last report."""
         return max(now_s - self.received_s, 0.0)
 
-    def position(self, now_s: float) -> Position | None:
-        """The last known position; once the report is stale, with a covariance that has grown by the time since then."""
-        p, silent_s = self.report.last_known, self.silent_s(now_s)
-        if p is None or self.presence == "ended" or silent_s <= self.stale_after_s:
-            return p
-        return replace(aged(p, silent_s), age_s=p.age_s + silent_s)
+    def at(self, now_s: float) -> Report:
+        """What the last report says at a time of the commander's clock: every age and every word is of that time."""
+        if self._at is None or self._at[0] != now_s:
+            self._at = now_s, later(self.report, self.silent_s(now_s))
+        return self._at[1]
+
+    def contradict(self) -> None:
+        """Note, and raise, that a report of this name and run is another sender's."""
+        self.notes[CONTRADICTION] += 1
+        raise BadReportError("a second sender under one name and run")
 
     def state(self, now_s: float) -> MemberState:
-        """State at a time of the commander's clock."""
+        """State at a time of the commander's clock: a call for help outranks the end of a run, and that a broken connection or silence."""
+        alarm = self.report.alarm
+        if alarm and alarm.kind == "mayday":
+            return MemberState.MAYDAY
+        if alarm and (alarm.kind, alarm.reason) == ("asking", "fall"):
+            return MemberState.ASKED
         if self.presence == "ended":
             return MemberState.ENDED
-        if self.report.alarm and self.report.alarm.kind == "mayday":
-            return MemberState.MAYDAY
-        if self.report.alarm and (self.report.alarm.kind, self.report.alarm.reason) == ("asking", "fall"):
-            return MemberState.ASKED
-        if self.report.status == "lost":
-            return MemberState.LOST
         if self.presence == "broken" or self.silent_s(now_s) > self.stale_after_s:
             return MemberState.STALE
-        return MemberState(self.report.status)
+        return MemberState(self.at(now_s).status)
 
 
 class Roster:
@@ -163,7 +166,7 @@ class Roster:
         self._remove_old(now_s)
 
         def urgency(m: Member) -> tuple[int, float, float, tuple[str, str, str]]:
-            p, state = m.report.position, m.state(now_s)
+            p, state = m.at(now_s).position, m.state(now_s)
             silence = (
                 m.silent_s(now_s)
                 if state in (MemberState.MAYDAY, MemberState.ASKED, MemberState.LOST, MemberState.STALE)
@@ -186,8 +189,7 @@ class Roster:
     def _receive_report(self, team: str, name: str, r: Report, retained: bool, now_s: float, unix_s: float) -> None:
         if (r.team, r.name) != (team, name):
             raise BadReportError("name and topic contradict each other")
-        if r.status == "lost" and r.position is not None:  # of another sender: a place that it knew last, no claim
-            r = without_place(r, r.position)
+        r = no_better(r, r.status)  # a lost one of another sender: a place that it knew last, no claim
         key = (team, name, r.run)
         ahead_s = r.sent_s - unix_s
         if retained and ahead_s < -MAX_RETAINED_S:
@@ -202,24 +204,16 @@ class Roster:
         if retained and r == last.report:
             return  # the broker repeats it after a new connection
         if r.sequence <= last.report.sequence:
-            if (
-                not retained and r.sent_s > last.report.sent_s
-            ):  # a sender's own reports are numbered in the order of time
-                last.notes[CONTRADICTION] += 1
-                raise BadReportError("a second sender under one name and run")
+            if not retained and r.sent_s > last.report.sent_s:  # a sender numbers in the order of time
+                last.contradict()
             raise BadReportError("older than what was heard before")
-        last.missed += r.sequence - last.report.sequence - 1
-        if not retained and not last.retained and abs(ahead_s - last.clock_ahead_s) > CLOCK_JUMP_S:
-            last.notes["clock jumped"] += 1
-        if _jumps(last.report.position, r.position):
-            last.notes["position jumped"] += 1
-        last.report, last.received_s, last.retained, last.clock_ahead_s = (
-            r,
-            max(received_s, last.received_s),
-            retained,
-            ahead_s,
-        )
-        if last.presence == "broken":
+        missed = r.sequence - last.report.sequence - 1
+        if missed > MAX_QUEUED + MOST_NUMBERS_S * last.silent_s(now_s):  # forged: the others would be older
+            last.contradict()
+        last.missed += missed
+        last.report, last.received_s, last._at = r, max(received_s, last.received_s), None
+        last.retained, last.clock_ahead_s = retained, ahead_s
+        if not retained or last.presence == "broken":
             last.presence = "online"
 
     def _receive_presence(self, team: str, name: str, p: Presence) -> None:
@@ -263,23 +257,3 @@ def _check_beacons(name: str, payload: bytes) -> None:
         raise BadReportError("not valid beacons")
     if beacons.name != name:
         raise BadReportError("beacons and topic contradict each other")
-
-
-def _jumps(before: Position | None, after: Position | None) -> bool:
-    """Whether two positions are farther apart than MAX_SPEED_M_S and both 95 % radii allow."""
-    if before is None or after is None or before.floor != after.floor:
-        return False
-    distance = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
-    reach_m = MAX_SPEED_M_S * max(after.t_s - before.t_s, 0.0)
-    return distance > reach_m + before.radius95_m + after.radius95_m + 1.0
-
-
-def nearest(member: Member, others: Iterable[Member]) -> tuple[float, Member] | None:
-    """Distance to the closest other member on the same floor, and that member, by their last reports."""
-    if (here := member.report.position) is None:
-        return None
-    positions = [(o, o.report.position) for o in others if o is not member]
-    candidates = [
-        (math.hypot(p.x_m - here.x_m, p.y_m - here.y_m), o) for o, p in positions if p and p.floor == here.floor
-    ]
-    return min(candidates, key=lambda pair: pair[0], default=None)

@@ -3,7 +3,7 @@
 
 In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
 The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
-`running_note`: a few words after the status while the foot rests too briefly for a walk.
+`running_note`: a few words after the status while the foot rests too briefly for a walk; `late_words`, `span_words`: ages.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from echostep.localization import Estimate, TrackStatus
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
+SETTLED_S = 2.0  # largest normal age of an estimate: the tracker gives two a second, or one per stride
 HOLD_S = 2.0  # assumed: two strides, and twice the second after which silence makes the next dropout
 _WORSE = list(TrackStatus)
 
@@ -31,11 +32,12 @@ class SteadyStatus:
         return max((each for _, each in self._recent), key=_WORSE.index)
 
     def shown(self, estimate: Estimate, tracker: Tracker) -> Estimate:
-        """The estimate with its steady status; a check-in, or its undoing, is a new beginning."""
+        """The estimate with its steady status, lost where it claims no place; a check-in, or its undoing, is a new beginning."""
         state = tracker.state
         if self._check_ins != (check_ins := (state.check_ins, state.undone)):
             self._recent, self._check_ins = [], check_ins
-        return replace(estimate, status=self.worst(estimate.t_s, estimate.status))
+        status = estimate.status if estimate.claims_place else TrackStatus.LOST
+        return replace(estimate, status=self.worst(estimate.t_s, status))
 
 
 def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
@@ -45,3 +47,13 @@ def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
     if not estimate.claims_place:
         return "running"
     return f"running: position good to about {estimate.ellipse95.major_m:.1f} m"
+
+
+def late_words(age_s: float) -> str:
+    """That a position is older than it normally is: "late 3 s"; else empty."""
+    return f"late {span_words(age_s)}" if age_s > SETTLED_S else ""
+
+
+def span_words(seconds: float) -> str:
+    """A time as text: 3 s, 5 min."""
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from echostep.localization.particles.places import LikelyPlace
-from echostep.particles.ellipse import CHI2_95, Ellipse, ellipse95, in_ellipse95
+from echostep.particles.ellipse import CHI2_95, Ellipse, ellipse95, in_ellipse95, widening_m2
 from echostep.particles.limits import LOST_M, TRACKING_M, WALKER_M_S
 
 TAIL = 1.5  # of the protection radius of a normal distribution, assumed: errors of echoes and steps have heavier tails
@@ -108,16 +108,12 @@ class Estimate:
         return place.level == self.level and math.hypot(place.x_m - self.x_m, place.y_m - self.y_m) <= reach_m
 
     def unobserved(self, t_s: float) -> Estimate:
-        """The same at `t_s`, without measurements since: the position spreads at WALKER_M_S, the heading is unknown."""
-        more = (WALKER_M_S * max(t_s - self.t_s, 0.0)) ** 2
-        return replace(
-            self,
-            t_s=t_s,
-            xx_m2=self.xx_m2 + more,
-            yy_m2=self.yy_m2 + more,
-            heading_sd_rad=math.pi,
-            status=TrackStatus.LOST,
-        )
+        """The same at `t_s`, without measurements since: both radii grow at WALKER_M_S, the status is no better than that, the heading is unknown."""
+        by_m, radius_m = WALKER_M_S * max(t_s - self.t_s, 0.0), self.ellipse95.major_m
+        status = max(self.status, TrackStatus.of(radius_m + by_m), key=list(TrackStatus).index)
+        more = widening_m2(radius_m, by_m)
+        grown = replace(self, xx_m2=self.xx_m2 + more, yy_m2=self.yy_m2 + more, protection_m=self.protection_m + by_m)
+        return replace(grown, t_s=t_s, heading_sd_rad=math.pi, status=status)
 
 
 def digest(estimates: Iterable[Estimate]) -> str:

@@ -25,10 +25,7 @@ class Ellipse(NamedTuple):
 
 
 def in_ellipse95(error_m: Floats, covariance_m2: Floats) -> Bools:
-    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); in an ellipse without area, only its centre does.
-
-    False where a covariance is NaN.
-    """
+    """Whether errors (..., 2) lie in the 95 % ellipses of covariances (..., 3: xx, xy, yy); in one without area only its centre does, in NaN none."""
     (dx, dy), (xx, xy, yy) = np.moveaxis(error_m, -1, 0), np.moveaxis(covariance_m2, -1, 0)
     determinant = xx * yy - xy**2
     inside = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy <= CHI2_95 * determinant
@@ -40,3 +37,8 @@ def ellipse95(xx_m2: float, xy_m2: float, yy_m2: float) -> Ellipse:
     mean, half = 0.5 * (xx_m2 + yy_m2), math.hypot(0.5 * (xx_m2 - yy_m2), xy_m2)
     major, minor = (math.sqrt(max(v, 0.0) * CHI2_95) for v in (mean + half, mean - half))
     return Ellipse(major, minor, 0.5 * math.atan2(2.0 * xy_m2, xx_m2 - yy_m2))
+
+
+def widening_m2(major_m: float, by_m: float) -> float:
+    """Variance per axis that makes the longer half axis of a 95 % ellipse longer by so much."""
+    return by_m * (2.0 * major_m + by_m) / CHI2_95

@@ -12,4 +12,4 @@ ROOM_M = 2.5  # particles this near to the middle of a cloud are in one place: a
 HALF_STOREY_M = 1.5  # difference of height within one level; an entrance over a few steps is on the ground
 THREE_SD2 = 9.0  # squared normalised innovation of an outlier: three standard deviations
 RISK = 1e-3  # probability of an error beyond the protection radius
-WALKER_M_S = 1.5  # speed at which an unobserved position spreads per axis: a brisk walk
+WALKER_M_S = 1.5  # speed at which an unobserved position spreads: a brisk walk

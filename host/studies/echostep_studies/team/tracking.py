@@ -22,7 +22,7 @@ from echostep.ports.people.meeting import MEETING, MeetingMessage
 from echostep.ports.people.team_beacons import SHARE_S, TEAM_BEACONS, TeamBeacons
 from echostep.tracker import Tracker
 from echostep_app.session.team.teammate_feed import meeting_with
-from echostep_app.team.outbox import aged
+from echostep_app.team.age import aged
 from echostep_app.team.publish import position_of
 from echostep_simulation.scenario import START_NS
 from echostep_studies.bench.walks import PORTION, T

@@ -54,7 +54,9 @@ def test_an_alarm_in_words(kind: AlarmKind, reason: AlarmReason, age_s: float, h
 def test_who_is_in_distress_is_told_who_knows_of_it() -> None:
     watch = WearerWatch()
     watch.alarm = Alarm(AlarmKind.MAYDAY, AlarmReason.HELP, 2, 90.0)
-    shown = shown_alarm(watch, 100.0, receipt_of=lambda _: "It is being sent.", acknowledged_by={2: "Ann"}.get)
+    shown = shown_alarm(
+        watch, 100.0, receipt_of=lambda _: "It is being sent.", answer_to=lambda _: "Ann has acknowledged it."
+    )
     assert shown
     assert shown.text == "Mayday: you asked for help. Ann has acknowledged it."
     assert "Ann has acknowledged it." in shown.spoken

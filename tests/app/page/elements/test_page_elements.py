@@ -22,6 +22,7 @@ from echostep_app.page import requests
 from echostep_app.page.elements.guidance import Destination, RouteFinder
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
 from echostep_app.page.elements.scene import status_text
+from echostep_app.page.elements.stream_rates import StreamRateMeter
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep_app.page.live import LivePage
@@ -207,3 +208,19 @@ def test_an_undoing_is_offered_for_ten_seconds_and_again_when_echoes_contradict(
     assert clock.offer(replace(state, right=0.2), 20 * seconds) == UndoOffer(1, 10.0, True)
     assert clock.offer(replace(state, right=0.2), 30 * seconds) is None
     assert clock.offer(replace(state, undoable=2), 31 * seconds) == UndoOffer(2, 10.0, False)
+
+
+@pytest.mark.parametrize(
+    ("ports", "wrong", "pings_hz"),
+    [
+        (set(), "", None),
+        ({"board"}, "no pings: look at the board's plug and at the rangers", 0.0),
+        ({"lines"}, "the foot IMU is silent: look at its plug and its power", None),
+    ],
+)
+def test_what_a_recording_does_not_have_is_not_missed(ports: set[str], wrong: str, pings_hz: float | None) -> None:
+    meter, tracker = StreamRateMeter(), Tracker(PLAN)
+    meter.ports.update(ports)
+    meter.foot = "foot IMU"
+    rates = [meter.measure(tracker, t_ns) for t_ns in (0, 1_000_000_000)][-1]
+    assert (rates.wrong, rates.pings_hz, rates.foot) == (wrong, pings_hz, "foot IMU")

@@ -161,7 +161,7 @@ def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk
 def test_without_bytes_a_guided_page_says_stop(chunks: list[Chunk]) -> None:
     tracker, guided = guided_tracker()
     early = chunks[: len(chunks) // 2]
-    shift_ns = time.monotonic_ns() - 3_000_000_000 - early[-1].t_arrival_ns
+    shift_ns = time.monotonic_ns() - 5_000_000_000 - early[-1].t_arrival_ns
     with LivePage(tracker, "test", LOCAL, guided) as live:
         portion = portion_of([replace(chunk, t_arrival_ns=chunk.t_arrival_ns + shift_ns) for chunk in early])
         tracker.take(portion)

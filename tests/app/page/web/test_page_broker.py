@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A broker that dies between a wearer and a commander, both as programs: both pages say so, and what is asked for meanwhile arrives once."""
+"""A broker that dies or freezes between a wearer and a commander, both programs: both pages say so, and what is asked for arrives once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -43,11 +43,12 @@ def program(*arguments: object) -> Iterator[str]:
         running.communicate(timeout=PATIENCE_S)
 
 
-def outage(wearer: Any, table: Any, broker: Broker) -> None:
+def outage(wearer: Any, table: Any, begin: Callable[[], None], end: Callable[[], None]) -> None:
     """Both pages say that the broker is gone, take what is asked for, and say what has become of it."""
-    broker.stop()
+    begin()
     began_s = time.monotonic()
     wait_for(table, f"{STATUS} === '{LOST}'")
+    wait_for(wearer, "!document.querySelector('#wrong').hidden")
     assert time.monotonic() - began_s < WITHIN_S
     wearer.click("#help", delay=HELD_MS)
     wait_for(wearer, "document.querySelector('#alarm').textContent.includes('It has not gone out: ')")
@@ -60,14 +61,15 @@ def outage(wearer: Any, table: Any, broker: Broker) -> None:
         assert overflow(page) == (0, 0)
         assert page.evaluate(UNREACHED) == []
     assert table.evaluate("echostep.scene.marks.length") == 0  # what is shown is what all commanders have
-    broker.start()
+    end()
     wait_for(table, f"{STATUS} === 'connected' && {ROW}.startsWith('mayday')")
     wait_for(table, f"echostep.scene.marks.length === 1 && !{OUTBOX}.includes('broker')")
 
 
 @pytest.mark.long
 @needs_broker
-def test_a_dead_broker_is_told(browser: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("begin", "end"), [("stop", "start"), ("freeze", "thaw")])
+def test_a_dead_or_frozen_broker_is_told(browser: Any, tmp_path: Path, begin: str, end: str) -> None:
     with Broker(tmp_path) as broker:
         walk = f"demo --speed 0.5 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
         follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
@@ -76,7 +78,7 @@ def test_a_dead_broker_is_told(browser: Any, tmp_path: Path) -> None:
             wearer = loaded_page(browser, wearer_url, how, READY)
             table = loaded_page(browser, table_url, how, TABLE_READY)
             table.fill("#me", "Ben")
-            outage(wearer, table, broker)
+            outage(wearer, table, getattr(broker, begin), getattr(broker, end))
             table.click("#list li:first-child button")
             table.click("#acknowledge")
             wait_for(wearer, "document.querySelector('#alarm').textContent.includes('Ben has acknowledged it')")

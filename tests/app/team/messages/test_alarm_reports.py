@@ -12,14 +12,12 @@ from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
-from echostep_app.team.commander import notes
 from echostep_app.team.cot import alarm_words, events
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages.report import BadReportError, ReportedAlarm, decode, encode
 from echostep_app.team.publish import Publishing
-from echostep_app.team.roster import MemberState
 from team.cot.test_cot_schema import faults
-from team.team_reports import NOW, PLACE, PLAN, heard, report, said
+from team.team_reports import PLACE, PLAN, report
 
 MAYDAY = ReportedAlarm("mayday", "no motion", 3, 34.0)
 OVER = ReportedAlarm("over", "no motion", 3, 2.0)
@@ -54,14 +52,6 @@ def test_a_mayday_is_an_emergency_with_place_floor_radius_and_heading() -> None:
     assert track.get("course") == "61.4"
 
 
-def test_a_report_carries_the_trunks_tilt_and_older_ones_have_none() -> None:
-    made = report(trunk_tilt_deg=85.0, alarm=replace(MAYDAY, reason="fall"))
-    assert decode(encode(made)) == made
-    assert decode(encode(made).replace(b',"trunk_tilt_deg":85.0', b"")).trunk_tilt_deg is None
-    with pytest.raises(BadReportError, match="trunk_tilt_deg"):
-        decode(encode(made).replace(b'"trunk_tilt_deg":85.0', b'"trunk_tilt_deg":181.0'))
-
-
 def test_its_end_cancels_the_emergency_and_a_question_is_none() -> None:
     _, over = (ElementTree.fromstring(made) for made in events(report(alarm=OVER)))
     assert over.get("type") == "b-a-o-can"
@@ -88,15 +78,6 @@ def test_its_end_cancels_the_emergency_and_a_question_is_none() -> None:
 )
 def test_an_alarm_in_words(alarm: ReportedAlarm, words: str) -> None:
     assert alarm_words(alarm) == words
-
-
-def test_a_mayday_is_first_in_the_roster_and_stays_when_the_wearer_falls_silent() -> None:
-    roster = heard(said("anna"), said("bo", alarm=MAYDAY), said("lost", status="lost"))
-    first = roster.members(NOW)[0]
-    assert (first.report.name, first.state(NOW)) == ("bo", MemberState.MAYDAY)
-    later = roster.members(NOW + 60.0)[0]
-    assert later.state(NOW + 60.0) is MemberState.MAYDAY
-    assert "mayday: no motion for 94 s" in notes(later, load_plan(PLAN), NOW + 60.0, set())
 
 
 def test_a_call_for_help_is_reported_although_no_estimate_comes() -> None:

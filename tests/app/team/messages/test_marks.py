@@ -15,7 +15,6 @@ from msgspec import structs
 from echostep_app.operation.command import RETAINED_S, Restorer
 from echostep_app.operation.requests import Send, parse_request
 from echostep_app.team.messages.marks import (
-    MOST_ERRANDS,
     MOST_MARKS,
     MOST_REMOVED,
     ROOT,
@@ -160,22 +159,6 @@ def test_a_flood_of_marks_is_bounded_and_keeps_those_that_are_there() -> None:
 
 KEY = ("red", "anna", "0123abcd")
 ERRAND = Errand(1, "finn", "2nd floor, in corridor", 3.0, 2.0, 2, "Ben", 1.8e9, "7" * 64)
-LATER = structs.replace(ERRAND, to="kim", where="", unix_s=1.8e9 + 60.0)
-
-
-def test_of_one_run_the_latest_counts_in_any_order_and_a_board_gives_it_back() -> None:
-    for messages in itertools.permutations([errand_message(KEY, ERRAND), errand_message(KEY, LATER)]):
-        board = MarkBoard()
-        for message in messages:
-            board.receive(*message)
-        assert board.errands == {KEY: LATER}
-        assert list(board.messages) == [errand_message(KEY, LATER)]
-        assert board.copy().errands == board.errands
-        assert list(board.answers) == (
-            [errand_message(KEY, LATER)] if messages[0] == errand_message(KEY, LATER) else []
-        )
-        board.receive(errand_message(KEY, LATER)[0], b"")
-        assert not board.errands
 
 
 @pytest.mark.parametrize(
@@ -193,14 +176,6 @@ def test_of_one_run_the_latest_counts_in_any_order_and_a_board_gives_it_back() -
 def test_what_is_no_errand_is_rejected_with_the_reason(topic: str, errand: Errand, reason: str) -> None:
     with pytest.raises(BadReportError, match=reason):
         MarkBoard().receive(topic, errand_message(KEY, errand)[1])
-
-
-def test_errands_are_bounded() -> None:
-    board = MarkBoard()
-    for k in range(MOST_ERRANDS):
-        board.receive(*errand_message(("red", "anna", f"{k:08x}"), ERRAND))
-    with pytest.raises(BadReportError, match="more than"):
-        board.receive(*errand_message(("red", "anna", "ffffffff"), ERRAND))
 
 
 def test_a_commander_sends_only_to_a_place_that_is_known() -> None:

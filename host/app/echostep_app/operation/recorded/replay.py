@@ -25,7 +25,8 @@ from echostep_app.interruption import sleep
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.recorded.record import KIND
 from echostep_app.operation.recorded.tape import OperationTape, Reader
-from echostep_app.team.commander import as_tree, table
+from echostep_app.operation.terminal import listed
+from echostep_app.team.commander import as_tree
 
 if TYPE_CHECKING:
     from echostep_app.operation.page import TablePage
@@ -79,7 +80,7 @@ def replay(path: Path, plan: Plan, seconds: float | None, views: Views, console:
                 sleep(math.inf if seconds is None else seconds)
     end_s = (tape.span_s or (0.0, 0.0))[1]
     if not views.as_json:
-        console.print(table(tape.operation.roster, plan, end_s, connected=True, columns=console.width))
+        console.print(listed(tape.operation.scene(end_s, 0.0), plan.name))
     views.finish(tape.operation, end_s)
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from echostep.odometry import AlarmKind, AlarmReason, WearerWatch
+from echostep_app.wearer.steady_status import span_words
 
 REPEAT_S = 5.0  # between two times that a sentence is spoken; assumed
 
@@ -30,11 +31,11 @@ def shown_alarm(
     now_s: float,
     *,
     receipt_of: Callable[[int], str] | None = None,
-    acknowledged_by: Callable[[int], str | None] | None = None,
+    answer_to: Callable[[int], str] | None = None,
 ) -> ShownAlarm | None:
-    """The present alarm; None while all is well. `receipt_of`: state of delivery of a mayday; None if the run's reports go nowhere.
+    """The present alarm; None while all is well. `receipt_of`: how far a mayday has come; None if the run's reports go nowhere.
 
-    `acknowledged_by`: name of the commander that acknowledged the alarm with a given number.
+    `answer_to`: what the commanders' side says of the alarm with a given number, empty without an answer: that is farther than any delivery.
     """
     alarm = watch.alarm
     if alarm is None:
@@ -43,8 +44,7 @@ def shown_alarm(
     age_s = 0.0 if math.isnan(age_s) else max(age_s, 0.0)
     times = 1000 * alarm.number + int(age_s / REPEAT_S)
     receipt = receipt_of(alarm.number) if receipt_of else "No team is connected: only this page says so."
-    if acknowledged_by and (commander := acknowledged_by(alarm.number)):
-        receipt = f"{commander} has acknowledged it."
+    receipt = (answer_to(alarm.number) if answer_to else "") or receipt
     left_s = max(math.ceil((alarm.mayday_s or alarm.since_s) - alarm.since_s - age_s), 0)
     match alarm.kind, alarm.reason:
         case AlarmKind.ASKING, reason:
@@ -57,7 +57,8 @@ def shown_alarm(
         case AlarmKind.MAYDAY, AlarmReason.HELP:
             return ShownAlarm(alarm.kind.value, f"Mayday: you asked for help. {receipt}", f"Mayday. {receipt}", times)
         case AlarmKind.MAYDAY, reason:
-            why = f"a fall {age_s:.0f} s ago" if reason is AlarmReason.FALL else f"no motion for {age_s:.0f} s"
+            ago = span_words(age_s)
+            why = f"a fall {ago} ago" if reason is AlarmReason.FALL else f"no motion for {ago}"
             text = f"Mayday: {why}. {receipt}"
             return ShownAlarm(alarm.kind.value, text, f"Mayday. {receipt} Walk, or tap, if you are all right.", times)
     return ShownAlarm(alarm.kind.value, "The mayday is over.", "The mayday is over.", 1000 * alarm.number)

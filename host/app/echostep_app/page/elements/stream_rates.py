@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, fields
 
+from echostep.ports.chunks import BOARD, FOOT, LINES, MTX
 from echostep.tracker import Tracker
 from echostep.tracker.state import StreamState
 from echostep.xsens.reader import MtxCounts
@@ -16,6 +17,7 @@ from echostep_app.board.faults.health import Severity, all_findings
 
 WINDOW_NS = 2_000_000_000  # over which rates are averaged
 SHORTEST_S = 0.5  # no rate is given for a shorter time
+FEET = {MTX, FOOT, LINES}  # ports of what is worn on the foot
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +42,11 @@ class StreamRates:
 
 
 class StreamRateMeter:
-    """Turns counters into rates; call `measure` after each portion."""
+    """Turns counters into rates; call `measure` after each portion. `ports`: those there are; `foot`: name of another maker's sensor on the foot."""
 
     def __init__(self) -> None:
+        self.ports: set[str] = set()
+        self.foot = ""
         self._counts: deque[tuple[int, int, int]] = deque()  # time (ns), MTx samples, pings
         self._unused = 0  # messages of the MTx that are not samples, when its samples were last counted
 
@@ -53,17 +57,25 @@ class StreamRateMeter:
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
         if mtx_hz != 0.0:
             self._unused = _unused(mtx)
+        foot, has_board = self.foot or streams.foot_name, BOARD in self.ports
+        advice = _advice(
+            streams,
+            foot,
+            mtx_hz if self.ports & FEET else None,
+            pings_hz if has_board else None,
+            _unused(mtx) - self._unused,
+        )
         dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
         return StreamRates(
             mtx_hz=mtx_hz,
-            pings_hz=pings_hz,
+            pings_hz=pings_hz if has_board else None,
             lost=board.lost + mtx.lost + dropped,
             rejected=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
             late_pings=streams.front_end.late_pings,
             synchronised=streams.synchronised,
             check_ins=tracker.state.check_ins,
-            wrong=". ".join(filter(None, (fault, _advice(streams, mtx_hz, pings_hz, _unused(mtx) - self._unused)))),
-            foot=streams.foot_name,
+            wrong=". ".join(filter(None, (fault, advice))),
+            foot=foot,
             undone=tracker.state.undone,
         )
 
@@ -85,13 +97,13 @@ def _unused(mtx: MtxCounts) -> int:
     return sum(getattr(mtx, field.name) for field in fields(mtx) if field.name not in ("good", "lost"))
 
 
-def _advice(streams: StreamState, mtx_hz: float | None, pings_hz: float | None, unused: int) -> str:
+def _advice(streams: StreamState, foot: str, mtx_hz: float | None, pings_hz: float | None, unused: int) -> str:
     """The gravest finding and what to do about it. `unused`: messages or bytes from the foot since its last sample, which gave none."""
     if mtx_hz == 0.0 and unused > 0:
         incomplete = " (without counter, acceleration or rate of turn)" if streams.mtx.incomplete else ""
-        return f"the {streams.foot_name} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"
+        return f"the {foot} sends no usable samples{incomplete}: look at its settings, its port and its RX line: echostep doctor"
     if mtx_hz == 0.0:
-        return f"the {streams.foot_name} is silent: look at its plug and its power"
+        return f"the {foot} is silent: look at its plug and its power"
     findings = [
         finding for finding in all_findings(streams.reports, streams.foot_reports) if finding.severity > Severity.NOTE
     ]

@@ -2,7 +2,7 @@
 // Fingers, mouse and keys on the map: pan, zoom, rotate, tap. In a mode that takes a position: a tap gives the position, a drag also the heading.
 
 const SLOP_PX = 10;  // a movement below this is a tap
-const TAKES = { '?': ['INPUT'], ' ': ['INPUT', 'SELECT', 'BUTTON', 'SUMMARY'] };  // controls that take these keys themselves
+const TEXTS = ['INPUT', 'SELECT'], TAKES = { '?': ['INPUT'], c: TEXTS, t: TEXTS, ' ': ['INPUT', 'SELECT', 'BUTTON', 'SUMMARY'] };  // controls that take these keys themselves
 const PAN_PX = 60;  // per arrow key
 
 export class Gestures {
@@ -91,7 +91,7 @@ export class Gestures {
     this.actions.moved();
   }
 
-  // ? and Space act wherever the focus is, but for what takes them itself.
+  // ?, C, T and Space act wherever the focus is, but for what takes them itself.
   anywhere(e) {
     const { tagName, type } = e.target, takes = TAKES[e.key]?.includes(tagName) && type !== 'range';
     if (e.key in TAKES && !takes && !e.defaultPrevented && !document.querySelector('dialog[open]')) this.key(e);

@@ -53,8 +53,8 @@ export class Outbox {
   answered({ request: identity, reason }) {
     const request = this.kept.find(({ request: own }) => own === identity);
     if (!request) return;
-    const isCall = request.kind === 'call', news = reason ? `not sent: ${reason}` : 'sent';
-    this.drop(request, isCall || (!reason && age_s(request) > SLOW_S) ? news : '');  // other refusals are the page's hint
+    const isCall = request.kind === 'call', isNews = reason ? isCall : !isCall && age_s(request) > SLOW_S;  // of a call that arrived the alarm says how far it came
+    this.drop(request, isNews ? (reason ? `not sent: ${reason}` : 'sent') : '');  // other refusals are the page's hint
   }
 
   isFresh(request) {

@@ -71,13 +71,17 @@ class TeamFeed:
 
     def _place(self, m: Member, now_s: float) -> Teammate | None:
         """Where a member is on this plan; None when it is tracked on another one, which is reported once."""
-        p = m.position(now_s)
-        if p is None or m.report.plan_sha256 != self._plan.digest or not 0 <= p.floor < len(self._plan.levels):
+        r = m.at(now_s)
+        if (
+            (p := r.last_known) is None
+            or m.report.plan_sha256 != self._plan.digest
+            or not 0 <= p.floor < len(self._plan.levels)
+        ):
             if not self._warned:
                 self._warned = True
                 self._print_line(f"{self._name} is tracked on another plan ({m.report.plan}): no way can be found")
             return None
-        last = "" if m.report.position else "last known"
+        last = "" if r.position else "last known"
         words = ", ".join(filter(None, (last, f"on {p.floor_name}" if p.floor_name else "", p.where)))
         # Rounded to centimetres: an unchanged place is passed on once
         return Teammate(
@@ -97,7 +101,7 @@ class MarkFeed:
         self._shown: tuple[ShownMark, ...] = ()
         self._errand: Errand | None = None  # the last one that was given
         own = outlet.team, outlet.name
-        topics = [MARKS, acks_of(*own), errand_of(self._key), f"{ORDERS}/{EVERYBODY}", f"{ORDERS}/{'/'.join(own)}"]
+        topics = [MARKS, *acks_of(*own), errand_of(self._key), f"{ORDERS}/{EVERYBODY}", f"{ORDERS}/{'/'.join(own)}"]
         topics.append(f"{RECEIPTS}/+/{'/'.join(own)}")
         self._send = subscription.send
         self._looks = subscription.add(topics, self._receive)
@@ -113,11 +117,13 @@ class MarkFeed:
         self._shown = shown
         return shown
 
-    def acknowledged_by(self, number: int) -> str | None:
-        """The commander that acknowledged the alarm of this number, as of the last call of `news`."""
+    def answer_to(self, number: int) -> str:
+        """Who has the mayday of this number, as of the last call of `news`: a person, a commander's computer; empty while it has neither."""
         team, name, run = self._key
-        ack = self._board.acks.get((team, name, f"{run}-{number}"))
-        return ack.by if ack else None
+        key = team, name, f"{run}-{number}"
+        if ack := self._board.acks.get(key):
+            return f"{ack.by} has acknowledged it."
+        return "A commander's screen shows it; no acknowledgement has come yet." if key in self._board.seen else ""
 
     def new_errand(self) -> Errand | None:
         """The errand of this wearer on this plan by a commander, as of the last call of `news`; each errand is given once."""
@@ -132,7 +138,7 @@ class MarkFeed:
         (team, name, _), since_s = self._key, time.time() - HOLDS_S
         found = ((kind, self._board.order_to(kind, team, name)) for kind in (EVERYBODY, NOTE))
         return tuple(
-            ShownOrder(f"{kind} {one[0].unix_s}", f"{one[0].by}: {one[0].text}", kind == EVERYBODY)
+            ShownOrder(f"{kind} {one[0].unix_s}", f"{one[0].by}{_ago(one[0].unix_s)}: {one[0].text}", kind == EVERYBODY)
             for kind, one in found if one and not one[1] and one[0].unix_s > since_s
         )  # fmt: skip
 
@@ -152,3 +158,9 @@ class MarkFeed:
             self._board.receive(message.topic or "", message.payload)
         except BadReportError as error:
             self.rejected[str(error)] += 1
+
+
+def _ago(unix_s: float) -> str:
+    """The age of an order in whole minutes; empty for a new one."""
+    minutes = int((time.time() - unix_s) / 60.0)
+    return f", {minutes} min ago" if minutes > 0 else ""

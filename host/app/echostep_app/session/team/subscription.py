@@ -59,7 +59,7 @@ class TeamSubscription:
     def fault(self) -> str:
         """Why nothing, or not all, of the team comes and goes at present; empty while all does."""
         fault = self._receiver.fault if self._receiver else ""
-        return f"{self._broker}: team: {fault}" if fault else ""
+        return f"team: {fault}" if fault else ""
 
     def look(self) -> None:
         """Pass the messages that have come since the last call to their readers; never waits."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from typing import Protocol
 
 from echostep.aiding import MOST_TEAMMATES
@@ -88,11 +87,10 @@ class TeammateFeed:
     def _meeting(self, name: str) -> bytes | None:
         now_s = time.monotonic()
         member = self._members(now_s).get(name)
-        position = None if member is None else member.position(now_s)
+        position = None if member is None else member.at(now_s).last_known
         if member is None or position is None or not 0 <= position.floor < len(self._plan.levels):
             return None
-        position = replace(position, age_s=member.report.position.age_s + member.silent_s(now_s))  # type: ignore[union-attr]
-        met = meeting_with(name, member.report.status, position)
+        met = meeting_with(name, member.at(now_s).status, position)
         return None if met is None else met.encode()
 
     def beacons(self) -> list[bytes]:

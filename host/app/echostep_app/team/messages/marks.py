@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Shared state of the commanders: marks on the plan, acknowledgements of alarms, errands, orders, crews, notes. The broker retains it for all.
 
-In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/ack/<team>/<wearer>/<run>-<number>` and
+In: retained messages from untrusted senders, on `echostep-table/mark/<id>`, `echostep-table/<ack, seen>/<team>/<wearer>/<run>-<number>` and
 `echostep-table/errand/<team>/<wearer>/<run>`; an empty one removes. Out: `Mark`s, `Ack`s and `Errand`s, and the messages for new ones. Owns those
 that are known; their number is bounded.
 
@@ -76,7 +76,7 @@ class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Ack(msgspec.Struct, frozen=True):
-    """An alarm that a commander has acknowledged."""
+    """An alarm that a commander has acknowledged; on `seen`, that a commander's computer shows."""
 
     echostep_ack: Literal[1]
     by: Person
@@ -107,14 +107,14 @@ RunKey = tuple[str, str, str]  # team, wearer, run
 _MARK = msgspec.json.Decoder(Mark)
 
 
-def ack_message(key: AlarmKey, by: str, unix_s: float) -> tuple[str, bytes]:
-    """Topic and payload of an acknowledgement."""
-    return f"{ROOT}/ack/{'/'.join(key)}", msgspec.json.encode(Ack(1, by, unix_s))
+def ack_message(key: AlarmKey, by: str, unix_s: float, kind: str = "ack") -> tuple[str, bytes]:
+    """Topic and payload of an acknowledgement, or of kind `seen`."""
+    return f"{ROOT}/{kind}/{'/'.join(key)}", msgspec.json.encode(Ack(1, by, unix_s))
 
 
-def acks_of(team: str, name: str) -> str:
-    """Topic filter of the acknowledgements of one wearer's alarms."""
-    return f"{ROOT}/ack/{team}/{name}/+"
+def acks_of(team: str, name: str) -> list[str]:
+    """Topic filters of the acknowledgements of one wearer's alarms, of either kind."""
+    return [f"{ROOT}/{kind}/{team}/{name}/+" for kind in ("ack", "seen")]
 
 
 def errand_message(key: RunKey, errand: Errand) -> tuple[str, bytes]:
@@ -141,14 +141,7 @@ class MarkBoard:
     def __init__(self) -> None:
         self.marks: dict[str, Mark] = {}
         self.removed: dict[str, Mark] = {}
-        self.acks: Kept[AlarmKey, Ack] = Kept(
-            Ack,
-            "acknowledgement",
-            MOST_ACKS,
-            lambda key, a: ack_message(key, a.by, a.unix_s),
-            lambda a: [a.by],
-            earliest=True,
-        )
+        self.acks, self.seen = self._acks_of("ack"), self._acks_of("seen")
         self.errands: Kept[RunKey, Errand] = Kept(
             Errand, "errand", MOST_ERRANDS, errand_message, lambda e: [e.by, e.to, e.where]
         )
@@ -164,6 +157,13 @@ class MarkBoard:
         )
         self.answers: deque[tuple[str, bytes]] = deque(maxlen=MOST_ANSWERS)
 
+    @staticmethod
+    def _acks_of(kind: str) -> Kept[AlarmKey, Ack]:
+        return Kept(
+            Ack, "acknowledgement", MOST_ACKS, lambda key, a: ack_message(key, a.by, a.unix_s, kind), lambda a: [a.by],
+            earliest=True,
+        )  # fmt: skip
+
     def copy(self) -> MarkBoard:
         """An independent copy of the board."""
         made = MarkBoard()
@@ -174,7 +174,13 @@ class MarkBoard:
 
     @property
     def _kept(self) -> tuple[Kept[Any, Any], ...]:
-        return self.acks, self.errands, self.orders, self.receipts, self.crews, self.log
+        return self.acks, self.seen, self.errands, self.orders, self.receipts, self.crews, self.log
+
+    def show(self, key: AlarmKey | None, unix_s: float) -> None:
+        """A commander's screen shows this mayday from now on: its wearer is told, once."""
+        if key and key not in self.acks and key not in self.seen and len(self.seen) < MOST_ACKS:
+            self.seen[key] = Ack(1, "commander", unix_s)
+            self.answers.append(ack_message(key, "commander", unix_s, "seen"))
 
     def order_to(self, kind: str, team: str, name: str) -> tuple[Order, bool] | None:
         """The order to everybody, or the note to one wearer, while it holds; and whether this wearer has understood it."""
@@ -196,8 +202,9 @@ class MarkBoard:
         match parts[1:]:
             case ["mark", identity]:
                 self._receive_mark(identity, payload)
-            case ["ack", *key]:
-                self.acks.receive(_checked_key(key), (topic, payload), self.answers)
+            case [("ack" | "seen") as kind, *key]:
+                kept = self.acks if kind == "ack" else self.seen
+                kept.receive(_checked_key(key), (topic, payload), self.answers)
             case ["errand", *key]:
                 self.errands.receive(_checked_key(key), (topic, payload), self.answers)
             case ["order", "everybody"]:

@@ -2,6 +2,7 @@
 """A connection to a broker, run by the thread that uses it.
 
 In: an endpoint. Out: a connected paho client. Owns nothing. Every fault is raised as an OSError, malformed packets of the broker included.
+The version of MQTT, 5 or 3.1.1, is negotiated at each connection: a broker that does not answer has refused none.
 """
 
 from __future__ import annotations
@@ -49,9 +50,31 @@ class UnwantedError(PermissionError):
     """The broker does not accept a message under this topic."""
 
 
-def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = False) -> paho.Client:
-    """A client that is not connected yet: for MQTT 5 if `newest`, else for MQTT 3.1.1."""
-    protocol = paho.MQTTv5 if newest else paho.MQTTv311
+Prepare = Callable[[paho.Client, int], None]  # sets up a client for this QoS
+
+
+def connected(endpoint: Endpoint, tls: Any, identity: str, prepare: Prepare) -> tuple[paho.Client, int]:
+    """A connected client by the newest version of MQTT that the broker speaks, and the greatest QoS that it takes; raises OSError."""
+    protocol, qos = paho.MQTTv5, 1
+    while True:
+        client = _client(endpoint, tls, identity, protocol)
+        prepare(client, qos)
+        try:
+            return client, min(qos, connect(client, endpoint))
+        except RefusedError as error:
+            close_socket(client)
+            if qos and isinstance(error, QosError):
+                qos = 0
+            elif protocol == paho.MQTTv5:
+                protocol = paho.MQTTv311
+            else:
+                raise
+        except OSError:
+            close_socket(client)
+            raise
+
+
+def _client(endpoint: Endpoint, tls: Any, identity: str, protocol: Any) -> paho.Client:
     client = paho.Client(CallbackAPIVersion.VERSION2, identity, protocol=protocol, reconnect_on_failure=False)
     client.connect_timeout = ANSWER_S
     if endpoint.user is not None:
@@ -64,7 +87,7 @@ def make_client(endpoint: Endpoint, tls: Any, identity: str, *, newest: bool = F
 def connect(client: paho.Client, endpoint: Endpoint) -> int:
     """Connect and wait for the broker's acceptance; returns the greatest QoS that it takes, 0 or 1.
 
-    Raises OSError, which is a RefusedError when the host answers.
+    Raises OSError, which is a RefusedError when the host answers, and a TimeoutError when the broker does not.
     """
     refused: list[Any] = []
     greatest = [1]
@@ -85,6 +108,8 @@ def connect(client: paho.Client, endpoint: Endpoint) -> int:
         raise ConnectionError(opening_words(error, secure=endpoint.secure)) from error
     try:
         run_until(client, lambda: client.is_connected() or bool(refused), "the broker does not answer")
+    except TimeoutError:
+        raise
     except OSError as error:
         if not refused:
             ended = CLIENT_REFUSAL if endpoint.secure else PLAIN_ENDED
@@ -145,6 +170,14 @@ def publish(client: paho.Client, topic: str, payload: bytes, qos: int = 1) -> bo
     if answer is not None and answer.is_failure:
         raise UnwantedError(f"{answer}")
     return qos > 0 and client.protocol == paho.MQTTv5
+
+
+def probe(client: paho.Client) -> None:
+    """Wait for any answer of the broker: to the end of a subscription that there is not [MQTT 3.1.1, 3.10.4]; raises OSError."""
+    answers: list[Any] = []
+    client.on_unsubscribe = lambda *answer: answers.append(answer)
+    client.unsubscribe("echostep-probe")
+    run_until(client, lambda: bool(answers), "the broker does not answer")
 
 
 def close_socket(client: paho.Client) -> None:

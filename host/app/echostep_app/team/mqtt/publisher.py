@@ -20,12 +20,10 @@ from echostep_app.team.messages.report import Presence, Report, encode
 from echostep_app.team.mqtt.broker import (
     CLIENT_ERRORS,
     LOOP_S,
-    QosError,
-    RefusedError,
     UnwantedError,
     close_socket,
-    connect,
-    make_client,
+    connected,
+    probe,
     publish,
     run_once,
     run_until,
@@ -41,28 +39,18 @@ class MqttTransport:
     def __init__(self, endpoint: Endpoint, team: str, name: str, run: str) -> None:
         self._endpoint, self._run, self._team, self._name = endpoint, run, team, name
         self._topic = f"echostep/{team}/{name}"
-        self._use_mqtt5, self._qos = True, 1
+        self._qos = 1
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
 
     def open(self) -> None:
-        """Connect; raises OSError with the broker's reason. After a refusal the next call uses the other version of MQTT (5 or 3.1.1)."""
+        """Connect; raises OSError with the broker's reason."""
         identity = f"echostep-{self._run}-{time.monotonic_ns() & 0xFFFFFF:06x}"
-        client = make_client(self._endpoint, self._tls, identity, newest=self._use_mqtt5)
-        client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=self._qos, retain=True)
-        self._client = client
-        try:
-            self._qos = min(self._qos, connect(client, self._endpoint))
-        except QosError:
-            if not self._qos:
-                raise
-            self._qos = 0
-            close_socket(client)
-            self.open()
-            return
-        except RefusedError:
-            self._use_mqtt5 = not self._use_mqtt5
-            raise
+
+        def leave_will(client: paho.Client, qos: int) -> None:
+            client.will_set(f"{self._topic}/presence", self._presence("broken"), qos=qos, retain=True)
+
+        self._client, self._qos = connected(self._endpoint, self._tls, identity, leave_will)
         self._publish("presence", self._presence("online"))
 
     def send(self, report: Report) -> Delivery:
@@ -111,21 +99,16 @@ class Listener:
         self._endpoint, self._topics, self._put = endpoint, topics, put
         self._tls = tls_context(endpoint) if endpoint.secure else None
         self._client: paho.Client | None = None
-        self._use_mqtt5, self._qos = True, 1
+        self._qos = 1
 
     def open(self) -> str:
-        """Connect and subscribe; returns which topics the broker refuses, in words; raises OSError, also when it refuses all.
+        """Connect and subscribe; returns which topics the broker refuses, in words; raises OSError, also when it refuses all."""
 
-        After a refusal of the connection the next call uses the other version of MQTT (5 or 3.1.1).
-        """
-        client = make_client(self._endpoint, self._tls, "", newest=self._use_mqtt5)
-        client.on_message = self._message
-        self._client = client
-        try:
-            self._qos = connect(client, self._endpoint)
-        except RefusedError:
-            self._use_mqtt5 = not self._use_mqtt5
-            raise
+        def listen(client: paho.Client, _qos: int) -> None:
+            client.on_message = self._message
+
+        self._client, self._qos = connected(self._endpoint, self._tls, "", listen)
+        client = self._client
         answers: list[list[bool]] = []  # whether each topic is refused
         client.on_subscribe = lambda _c, _u, _m, codes, _p: answers.append([code.is_failure for code in codes])
         client.subscribe([(topic, 0) for topic in self._topics])
@@ -143,6 +126,12 @@ class Listener:
         if self._client is None:
             raise ConnectionError("not connected")
         run_once(self._client, timeout_s)
+
+    def probe(self) -> None:
+        """Wait for an answer of the broker; raises OSError."""
+        if self._client is None:
+            raise ConnectionError("not connected")
+        probe(self._client)
 
     def publish(self, topic: str, payload: bytes) -> None:
         """Publish a message that the broker keeps, and wait for its answer; raises OSError."""

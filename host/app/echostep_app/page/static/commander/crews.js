@@ -28,15 +28,12 @@ export class Crews {
     $('crew-new').onsubmit = (e) => { e.preventDefault(); this.add(); };
   }
 
-  act(kind, fields) {
-    if (!$('me').value.trim()) this.dialog.close();  // the name is asked for on the page
-    return this.signed((by) => this.send(kind, { ...fields, by }));
-  }
+  act(kind, fields) { this.signed((by) => this.send(kind, { ...fields, by })); }
 
   add() {
     const members = $('crew-members').value.split(',').map((name) => name.trim().slice(0, 32)).filter(Boolean).slice(0, 8);
-    const isSent = this.act('crew', { name: $('crew-name').value.trim(), members, air_min: Number($('crew-air').value) });
-    if (isSent) $('crew-name').value = $('crew-members').value = '';
+    this.act('crew', { name: $('crew-name').value.trim(), members, air_min: Number($('crew-air').value) });
+    $('crew-name').value = $('crew-members').value = '';
   }
 
   // `unix_s`: of the frame, which is not the clock's in a recorded operation.

@@ -5,8 +5,7 @@ import { tr } from '../language.js';
 import { clock, put, said, say } from '../text.js';
 
 export const SIGNS = { mayday: '▲', asked: '△', lost: '✕', stale: '◌', uncertain: '◐', waiting: '○', tracking: '●', ended: '■' };
-const URGENT = ['mayday', 'asked', 'lost', 'stale'];
-const CALLS = ['mayday', 'asked'];  // above all others, however the list is sorted and whatever is looked for
+export const CALLS = ['mayday', 'asked'], URGENT = [...CALLS, 'lost', 'stale'];  // calls come above all others, however the list is sorted and whatever is looked for
 const MANY = 8;  // more than so many can be sorted and looked through
 const ORDERS = { need: () => 0, name: (a, b) => a.name.localeCompare(b.name), floor: (a, b) => (b.level ?? -1) - (a.level ?? -1) };
 const $ = (id) => document.getElementById(id);

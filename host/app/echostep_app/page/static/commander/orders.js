@@ -17,7 +17,7 @@ export class Orders {
       $(`${name}-form`).onsubmit = (e) => {
         e.preventDefault();
         const [field] = e.target.elements, text = field.value.trim();
-        if (text && signed((by) => act({ by, text }))) field.value = '';
+        if (text) signed((by) => { act({ by, text }); field.value = ''; });
       };
     };
     written('note', (fields) => send('order', { ...fields, to: chosen() }));

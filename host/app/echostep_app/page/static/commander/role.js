@@ -5,7 +5,7 @@ import { COMMAND, COMMAND_KEYS } from '../legend.js';
 import { say, tell } from '../text.js';
 import { Alarm } from './alarm.js';
 import { Crews } from './crews.js';
-import { List } from './list.js';
+import { CALLS, List, URGENT } from './list.js';
 import { Orders } from './orders.js';
 import { Sheet } from './sheet.js';
 import { Storeys } from './storeys.js';
@@ -14,7 +14,6 @@ import { TeamPainter } from './wearers.js';
 import { parseFrame, placesOf } from './wire.js';
 
 const TAP_PX = 28;  // a wearer within this distance of a tap is chosen
-const URGENT = ['mayday', 'asked', 'lost', 'stale'], CALLS = ['mayday', 'asked'];
 const $ = (id) => document.getElementById(id);
 
 export class Commander {
@@ -166,20 +165,20 @@ export class Commander {
       return id === undefined ? this.floorChosen(level) : this.list.choose(id);
     }
     if (scene.measure.points.length === 1) return measured(position);
-    const places = scene.rows.map(({ id }) => scene.places.get(id)).filter(Boolean), near = this.nearest(places, pixel, ({ x, y }) => [x, y]);
+    const near = this.nearest(this.painter.shown ?? [], pixel, ({ at }) => at);
     if (near) this.list.choose(near.id);
     else this.open(position, pixel);
   }
 
-  // The nearest of what is on this level within reach of a pixel.
+  // The nearest within reach of a pixel; `at`: theirs.
   nearest(all, [sx, sy], at) {
-    const { scene, view } = this.page, far = (one) => { const [x, y] = view.toScreen(...at(one)); return Math.hypot(x - sx, y - sy); };
-    return all.filter((one) => one.level === scene.level && far(one) < TAP_PX).sort((a, b) => far(a) - far(b))[0];
+    const far = (one) => { const [x, y] = at(one); return Math.hypot(x - sx, y - sy); };
+    return all.filter((one) => far(one) < TAP_PX).sort((a, b) => far(a) - far(b))[0];
   }
 
   // What can be done at a place: with the mark that is there, or a new one.
   open([x_m, y_m], pixel) {
-    const { scene, view } = this.page, mark = this.nearest(scene.marks, pixel, ({ x_m: x, y_m: y }) => [x, y]);
+    const { scene, view } = this.page, mark = this.nearest(scene.marks.filter(({ level }) => level === scene.level), pixel, ({ x_m, y_m }) => view.toScreen(x_m, y_m));
     this.sheet.open({ x_m, y_m, level: scene.level }, mark, pixel, [view.width, view.height]);
   }
 

@@ -15,21 +15,16 @@ export class Sheet {
     $('measure').onclick = () => { this.close(); measure([this.at.x_m, this.at.y_m], this.at.level); };
     $('me').value = recall('commander') ?? '';
     $('me').onchange = () => remember('commander', $('me').value);
-    for (const kind of KINDS) $(`mark-${kind}`).onclick = () => this.signed((by) => this.send('mark', { mark: kind, ...this.at, by })) && this.close();
+    for (const kind of KINDS) $(`mark-${kind}`).onclick = () => { this.signed((by) => this.send('mark', { mark: kind, ...this.at, by })); this.close(); };
     $('mark-remove').onclick = () => { this.send('unmark', { id: this.mark.id }); this.close(); };
     $('sheet-close').onclick = () => this.close();
   }
 
-  // Call `act` with the commander's name; without one it is asked for.
+  // Call `act` with the commander's name, which is asked for afterwards: nothing waits for it.
   signed(act) {
     const by = $('me').value.trim().slice(0, 32);
-    if (!by) {
-      this.onHint('Enter your name first: marks and acknowledgements are signed.');
-      $('me').focus();
-      return false;
-    }
-    act(by);
-    return true;
+    act(by || 'commander');
+    if (!by) this.onHint('Signed "commander": enter your name.');
   }
 
   open(at, mark, pixel, size) {

@@ -4,14 +4,14 @@
 import { boxOf, linesOf } from '../plan.js';
 import { View } from '../view.js';
 
-const FLAT = 0.4;  // of a storey's depth is seen
+const FLAT = 0.4, DEEP = 0.8;  // of a storey's depth is seen: at least, and where there is room
 const MARGIN_PX = 24, GAP_PX = 20, FONT = '600 12px system-ui, sans-serif';
 
 // One storey around a point of the screen.
 class Storey extends View {
   matrix() {
     const [a, b, c, d, e, f] = super.matrix(), [sx, sy] = this.middle;
-    return [a, FLAT * b, c, FLAT * d, e - this.width / 2 + sx, FLAT * (f - this.height / 2) + sy];
+    return [a, this.flat * b, c, this.flat * d, e - this.width / 2 + sx, this.flat * (f - this.height / 2) + sy];
   }
 }
 
@@ -33,10 +33,10 @@ export class Storeys {
   // The storeys in the free part of the map.
   arrange({ free: [l, t, r, b], turn, width, height }) {
     const [x0, y0, x1, y1] = this.box, c = Math.abs(Math.cos(turn)), s = Math.abs(Math.sin(turn)), [w, h] = [Math.max(x1 - x0, 1), Math.max(y1 - y0, 1)], band = (b - t) / this.floors.length;
-    const scale = Math.max(Math.min((r - l - 2 * MARGIN_PX) / (c * w + s * h), (band - GAP_PX) / FLAT / (s * w + c * h)), 0.1);
+    const scale = Math.max(Math.min((r - l - 2 * MARGIN_PX) / (c * w + s * h), (band - GAP_PX) / FLAT / (s * w + c * h)), 0.1), deep = scale * (s * w + c * h), flat = Math.min(Math.max((band - GAP_PX) / deep, FLAT), DEEP);
     this.floors.forEach((floor, k) => {
-      floor.view = Object.assign(new Storey(), { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale, turn, width, height, middle: [(l + r) / 2, b - band * (k + 0.5)] });
-      floor.edge = [l + 4, Math.min(b - band * k - 4, floor.view.middle[1] + FLAT * scale * (s * w + c * h) / 2 + GAP_PX - 4)];
+      floor.view = Object.assign(new Storey(), { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale, turn, width, height, flat, middle: [(l + r) / 2, b - band * (k + 0.5)] });
+      floor.edge = [l + 4, Math.min(b - band * k - 4, floor.view.middle[1] + flat * deep / 2 + GAP_PX - 4)];
     });
   }
 
@@ -54,8 +54,8 @@ export class Storeys {
       pen.fillText(name, ...edge);
     }
     const storeys = new Map(this.floors.map((floor) => [floor.level, floor.view]));
-    this.shown = rows.map(({ place, ...row }) => ({ ...row, place: { ...place, heading: NaN, radius: NaN, protection: NaN }, at: storeys.get(place.level).toScreen(place.x, place.y) }));
-    painter.wearers(view, this.shown, chosen);
+    const shown = rows.map(({ place, ...row }) => ({ ...row, place: { ...place, heading: NaN, radius: NaN, protection: NaN }, at: storeys.get(place.level).toScreen(place.x, place.y) }));
+    this.shown = painter.wearers(view, shown, chosen);
   }
 
   // The wearer nearest to a pixel, within `reach`, and the storey there.

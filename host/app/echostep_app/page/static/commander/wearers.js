@@ -3,14 +3,14 @@
 
 import { paintMarks } from '../marks.js';
 import { Painter } from '../paint.js';
+import { URGENT } from './list.js';
 import { Sprites } from './sprites.js';
 import { trace } from './trails.js';
 
 const OF_STATE = { mayday: 'bad', asked: 'bad', lost: 'bad', stale: 'bad', uncertain: 'fair', waiting: 'faint', tracking: 'good', ended: 'faint' };
-const URGENT = ['mayday', 'asked', 'lost', 'stale'];
 const WIDEST_M = 60;  // radius that is still drawn
 const WIDEST_SPRITE_PX = 80;  // radius of a circle that is kept as a picture
-const SIGN_PX = 8, ARROW_PX = SIGN_PX + 9, MAYDAY_PX = SIGN_PX + 19;
+const SIGN_PX = 8, ARROW_PX = SIGN_PX + 9, MAYDAY_PX = SIGN_PX + 19, FAN_PX = 4 * SIGN_PX, FAN = 6;  // signs around one
 const HEADINGS = 72;  // directions in which an arrow is drawn
 const FONT = '600 13px system-ui, sans-serif';
 const MOST_WIDTHS = 1024;  // names whose width is kept
@@ -47,16 +47,17 @@ export class TeamPainter extends Painter {
     this.sprites.draw(this.pen, key, sx, sy, half, (pen) => paint(Object.assign(Object.create(this), { pen })));
   }
 
-  // `at`: their pixels.
+  // `at`: their pixels. Returns those that are shown with the pixels of their signs: on one spot they are fanned out.
   wearers(view, wearers, chosen) {
-    const shown = wearers.filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200);
+    const shown = fanned(wearers.filter(({ at: [sx, sy] }) => sx > -200 && sy > -200 && sx < view.width + 200 && sy < view.height + 200));
     for (const wearer of [...shown].reverse()) this.wearer(view, wearer, wearer.id === chosen);
     this.names(view, shown, chosen);
+    return this.shown = shown;
   }
 
-  wearer(view, { state, place, at: [sx, sy] }, isChosen) {
+  wearer(view, { state, place, spot, at: [sx, sy] }, isChosen) {
     const name = OF_STATE[state] ?? 'faint', colour = this.colour[name], safe = Number.isFinite(place.protection), radius = safe ? place.protection : place.radius;
-    if (state !== 'ended' && radius < WIDEST_M && radius * view.scale > SIGN_PX) this.around(sx, sy, Math.round(radius * view.scale), name, safe);
+    if (state !== 'ended' && radius < WIDEST_M && radius * view.scale > SIGN_PX) this.around(...spot, Math.round(radius * view.scale), name, safe);
     if (state === 'mayday') for (const more of [12, 17]) this.circle([sx, sy], SIGN_PX + more, this.colour.bad, 2.5);
     if (isChosen) this.circle([sx, sy], SIGN_PX + 9, this.colour.ink, 2.5);
     const heading = Number.isFinite(place.heading) ? Math.round((-place.heading - view.turn) / (2 * Math.PI) * HEADINGS) : null;
@@ -120,6 +121,15 @@ export class TeamPainter extends Painter {
     if (!this.widths.has(name)) this.widths.set(name, this.pen.measureText(name).width);
     return this.widths.get(name);
   }
+}
+
+// Each sign beside those before it whose spot is less than a sign away, around that spot.
+function fanned(wearers) {
+  const spots = [];
+  return wearers.map((wearer) => {
+    const [sx, sy] = wearer.at, spot = spots.find(([x, y]) => Math.hypot(x - sx, y - sy) < SIGN_PX) ?? spots[spots.push([sx, sy, 0]) - 1], k = spot[2]++, far = FAN_PX * Math.ceil(k / FAN), turn = 2 * Math.PI * k / FAN;
+    return { ...wearer, spot: wearer.at, at: [spot[0] + far * Math.cos(turn), spot[1] - far * Math.sin(turn)] };
+  });
 }
 
 // Whether two boxes [left, top, right, bottom, wearer] of different wearers cover each other.

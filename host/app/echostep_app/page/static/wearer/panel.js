@@ -130,5 +130,5 @@ const length = (metres) => (metres === null ? 'none' : `${metres.toFixed(2)} m`)
 function rateText({ foot, mtx_hz, pings_hz, lost, rejected, late_pings, synchronised }) {
   const rate = (value, unit) => (value === null ? '…' : `${Math.round(value)}${unit}`);
   const late = late_pings ? ` · ${late_pings} late` : '';
-  return `${foot} ${rate(mtx_hz, ' Hz')} · pings ${rate(pings_hz, '/s')} · drops ${lost}${late} · bad ${rejected}${foot !== 'MTx' ? '' : synchronised ? ' · SyncOut' : ' · no SyncOut'}`;
+  return `${foot} ${rate(mtx_hz, ' Hz')}${pings_hz === null ? '' : ` · pings ${rate(pings_hz, '/s')}`} · drops ${lost}${late} · bad ${rejected}${foot !== 'MTx' ? '' : synchronised ? ' · SyncOut' : ' · no SyncOut'}`;
 }
