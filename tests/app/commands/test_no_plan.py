@@ -29,7 +29,7 @@ def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
         for chunk in scenario.chunks():
             recorder.write(chunk)
     replay = ("replay", str(recorder.path), "--headless")
-    done = echostep(*replay, "--out", "first", "--guide", "start", cwd=tmp_path)
+    done = echostep(*replay, "--out", "first", "--guide", "exit", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "first/track.csv").read_text().splitlines()))
     x, y = (np.array([float(row[name]) for row in rows]) for name in ("x_m", "y_m"))
@@ -47,7 +47,7 @@ def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
     assert "nothing corrects the drift" in again.stdout
     refused = echostep(*replay, "--guide", "Kitchen", cwd=tmp_path)
     assert (refused.returncode, refused.stderr.strip()) == (
-        2, "echostep: --guide Kitchen: without a plan the only destination is: start",
+        2, "echostep: --guide Kitchen: without a plan the only destination is: exit",
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -235,7 +236,8 @@ def test_who_leaves_the_way_gets_another_one_around_the_walls() -> None:
     plan = demo()
     routes = Routes(plan)
     goal = plan.levels[0].rooms[3].at_m
-    g = Guide(routes.way(RoutePlace(2.0, 7.5), RoutePlace(*goal)), planner=routes)
+    again = partial(routes.way, end=RoutePlace(*goal))
+    g = Guide(again(RoutePlace(2.0, 7.5)), again=again)
     g.cue(at(0, 2.0, 7.5))
     cue = g.cue(at(20, 6.3, 4.9))  # he went into the store
     assert cue.kind is CueKind.OFF

@@ -16,7 +16,7 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import EXIT, RoutePlace
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_destinations_are_rooms_or_places() -> None:
     plan = demo()
     assert destination("office 2", plan) == RoutePlace(9.4, 12.2)
     assert destination("3,2", plan) == RoutePlace(3.0, 2.0)
-    assert destination("start", plan) == RoutePlace(2.0, 7.5)
+    assert destination("exit", plan) == EXIT
     for wrong in ("kitchen", "1,2,9", "nan,1", "1,2,3,4"):
         with pytest.raises(EchostepError, match="Office 1"):
             destination(wrong, plan)

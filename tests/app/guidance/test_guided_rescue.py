@@ -20,8 +20,7 @@ from echostep.plan import Connector, Level, Plan, Pose, load_plan
 from echostep.ports.chunks import TEAM, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import CueKind
-from echostep_app.guidance.guided_rescue import GuidedRescue
-from echostep_app.guidance.guided_run import guidance_of
+from echostep_app.guidance.guided_run import GuidedRescue, guidance_of
 from echostep_app.guidance.tours import room_tour, tour
 from echostep_app.plan.routing import Route, RoutePlace
 from echostep_app.ports.teammate import Teammate, parse_teammate

@@ -126,10 +126,10 @@ def test_the_way_back_is_the_shortest_through_the_positions(moves: list[tuple[fl
     assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(back[-1])
 
 
-def test_without_a_plan_the_start_is_the_only_destination() -> None:
+def test_without_a_plan_the_way_out_is_the_way_back() -> None:
     tracker: Any = Tracker(NO_PLAN)
-    assert isinstance(guidance_of(tracker, "start"), GuidedReturn)
-    with pytest.raises(EchostepError, match="--guide Kitchen: without a plan the only destination is: start"):
+    assert isinstance(guidance_of(tracker, "exit"), GuidedReturn)
+    with pytest.raises(EchostepError, match="--guide Kitchen: without a plan the only destination is: exit"):
         guidance_of(tracker, "Kitchen")
 
 

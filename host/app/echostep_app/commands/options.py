@@ -207,7 +207,9 @@ BeaconsPort = Annotated[
 GuideTo = Annotated[
     str | None,
     typer.Option(
-        "--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], start, or wearer:NAME of the team."
+        "--guide",
+        metavar="TO",
+        help="Guide the wearer to a room, X,Y[,LEVEL], the nearest exit, or wearer:NAME of the team.",
     ),
 ]
 

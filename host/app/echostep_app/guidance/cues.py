@@ -8,9 +8,9 @@ In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 
@@ -82,25 +82,26 @@ class GuidanceSettings:
     say_again_s: float = 8.0
 
 
-class _Planner(Protocol):
-    """Finds a route between two places."""
-
-    def way(self, start: RoutePlace, end: RoutePlace) -> Route: ...
-
-
 class Guide:
     """Guides one wearer along one route.
 
-    With a planner, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
+    With `again`, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
     """
 
-    def __init__(self, route: Route, settings: GuidanceSettings | None = None, planner: _Planner | None = None) -> None:
-        """Raises EchostepError for a route without stretches."""
+    def __init__(
+        self,
+        route: Route,
+        settings: GuidanceSettings | None = None,
+        again: Callable[[RoutePlace], Route] | None = None,
+        arrived: str = "You have arrived",
+    ) -> None:
+        """`again`: finds a route from a position off it. Raises EchostepError for a route without stretches."""
         if not route.stretches:
             raise EchostepError("a route needs at least one stretch")
         self.route = route
+        self.arrived = arrived
         self._settings = settings or GuidanceSettings()
-        self._planner = planner
+        self._again = again
         self._stretch = 0
         self._progress_m = 0.0
         self._arrow: float | None = None
@@ -126,7 +127,7 @@ class Guide:
             return CueKind.STOP, NEVER_KNOWN, None
         self._update_progress(e)
         if not lost and self._has_arrived(e):
-            return CueKind.ARRIVED, "You have arrived", None
+            return CueKind.ARRIVED, self.arrived, None
         why = "Your place is not known" if lost else "No beacon hears you"
         if back and self._known_level == e.level:
             x, y = self._contact["known_x"], self._contact["known_y"]
@@ -184,7 +185,7 @@ class Guide:
         if off_m > s.off_m + e.ellipse95.major_m:
             return self._choose_off_route(e, off_m)
         if self._has_arrived(e):
-            return CueKind.ARRIVED, "You have arrived", None
+            return CueKind.ARRIVED, self.arrived, None
         arrow = turn_ahead(line, self._progress_m + s.ahead_m, e.x_m, e.y_m, e.heading_rad)
         rest = way_m(line) - self._progress_m
         if not self._last and rest < s.ahead_m:
@@ -216,12 +217,10 @@ class Guide:
         return self._stretch == len(self.route.stretches) - 1
 
     def _choose_off_route(self, e: Estimate, off_m: float) -> Choice:
-        """The cue off the route: a new route with a planner, else the direction back to the route."""
-        if self._planner is not None:
-            end = self.route.stretches[-1]
-            goal = RoutePlace(float(end.line_m[-1, 0]), float(end.line_m[-1, 1]), end.level)
+        """The cue off the route: another route where one is looked for, else the direction back to the route."""
+        if self._again is not None:
             try:
-                self.route = self._planner.way(RoutePlace(e.x_m, e.y_m, e.level), goal)
+                self.route = self._again(RoutePlace(e.x_m, e.y_m, e.level))
             except EchostepError:
                 return CueKind.STOP, "Stop. No way leads on from here", None
             self._stretch, self._progress_m = 0, 0.0

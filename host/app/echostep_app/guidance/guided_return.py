@@ -51,7 +51,7 @@ class GuidedReturn(CueList):
         """The way back."""
         return self._guide.route if self._guide else _route(self._way.line_m())
 
-    def way(self, start: RoutePlace, _end: RoutePlace) -> Route:
+    def way(self, start: RoutePlace) -> Route:
         """The way back from a position off the way."""
         begin, line = np.array([[start.x_m, start.y_m]]), self._way.line_m()
         return Route((Stretch(0, np.concatenate([begin, line])),))
@@ -77,9 +77,8 @@ class GuidedReturn(CueList):
 
     def _begin(self, e: Estimate) -> Cue:
         """Begin the return; its first cue."""
-        here = RoutePlace(e.x_m, e.y_m)
         self._least_m = self._way.back_m
-        self._guide = Guide(self.way(here, here), planner=self)
+        self._guide = Guide(self.way(RoutePlace(e.x_m, e.y_m)), again=self.way)
         return self._guide.cue(e, self._tracker.state.beacon_heard_s)
 
     def _cue_back(self, e: Estimate, guide: Guide) -> Cue:

@@ -25,6 +25,7 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.player import Player
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
+from echostep_app.plan.routing import RoutePlace
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -199,7 +200,8 @@ class PageSession(GuardedSocket):
     async def _search(self, destination: Destination, estimate: Estimate) -> None:
         """Search for the route to a destination in a thread; frames are sent meanwhile."""
         try:
-            route = await asyncio.to_thread(self._shared.route_finder.find, estimate, destination.goal)
+            here = RoutePlace(estimate.x_m, estimate.y_m, estimate.level)
+            route = await asyncio.to_thread(self._shared.routes.way, here, destination.goal)
             destination.set_route(route, "", estimate)
         except EchostepError as error:
             destination.set_route(None, str(error), estimate)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Routes through a building: the shortest walk through doors, stairs and lifts.
+"""Routes through a building: the shortest walk through doors, stairs and lifts; the way out takes no lift.
 
 In: a plan, start and destination. Out: a `Route`: one polyline per level. Owns the grids of a plan's levels. Doors are gaps in the walls.
 The route is found on a grid [Dijkstra 1959] and then straightened, so that it bends only at corners.
@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import heapq
 import math
+import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -18,7 +21,8 @@ from echostep.errors import EchostepError
 from echostep.jit import kernel, part
 from echostep.plan import Plan
 from echostep.walls.near_walls import mark_near_walls
-from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.cropping import extent, is_clear
+from echostep_app.plan.places.exits import exits_of
 from echostep_app.plan.polyline import way_m
 
 # All assumed:
@@ -31,6 +35,7 @@ MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
 LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
 TIGHT = 20.0  # cost of a metre of a connector within BODY_M of a wall, in metres of level walk: the way goes round a wall between two flights
+EXIT: Literal["exit"] = "exit"  # the destination that is the nearest exit
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,9 @@ class RoutePlace:
     x_m: float
     y_m: float
     level: int = 0
+
+
+Goal = RoutePlace | Literal["exit"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,20 +72,23 @@ class Route:
 
 
 class Routes:
-    """Finds routes through one plan."""
+    """Finds routes through one plan, one at a time, in any thread; the grids are laid for the first one."""
 
     def __init__(self, plan: Plan) -> None:
-        """Lay the grids; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
-        ends = np.concatenate([level.solid.reshape(-1, 2) for level in plan.levels])
-        low = ends.min(0) if len(ends) else np.zeros(2)
-        high = ends.max(0) if len(ends) else np.zeros(2)
-        self._low = low - MARGIN_M
-        columns, rows = (int(n) for n in np.ceil((high + MARGIN_M - self._low) / CELL_M))
+        self._plan = plan
+        self._lock = threading.Lock()
+        self._exits: tuple[RoutePlace, ...] | None = None  # None: no grids yet
+
+    def _lay(self) -> tuple[RoutePlace, ...]:
+        """Lay the grids; returns the exits; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
+        plan = self._plan
+        x0, y0, x1, y1 = extent(np.concatenate([level.solid for level in plan.levels]))
+        self._low = np.array([x0, y0]) - MARGIN_M
+        columns, rows = (int(n) for n in np.ceil((np.array([x1, y1]) + MARGIN_M - self._low) / CELL_M))
         if columns * rows * len(plan.levels) > MOST_CELLS:
             raise EchostepError(
                 f"plan {plan.name}: too large to find routes in: {columns} x {rows} cells on {len(plan.levels)} levels"
             )
-        self._plan = plan
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
         self._tight = np.zeros_like(self._blocked)
         for k, level in enumerate(plan.levels):
@@ -88,6 +99,7 @@ class Routes:
         self._lay_connectors(plan)
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
+        return tuple(RoutePlace(pose.x_m, pose.y_m, pose.level) for pose in exits_of(plan))
 
     def _lay_connectors(self, plan: Plan) -> None:
         """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free, or tight where a wall is near.
@@ -104,15 +116,30 @@ class Routes:
                 self._tight[level_index][cells] |= self._blocked[level_index][cells]
                 self._blocked[level_index][cells] = False
 
-    def way(self, start: RoutePlace, end: RoutePlace) -> Route:
+    def way(self, start: RoutePlace, end: Goal) -> Route:
         """The cheapest route; raises EchostepError when a position is outside the plan, or without a route."""
-        a, b = self._cell(start, "the start"), self._cell(end, "the destination")
-        trail = _search(self._blocked, self._tight, self._connector, self._serves, self._height, self._lift, a, b)
+        with self._lock:
+            if self._exits is None:
+                self._exits = self._lay()
+            return self._way(start, (end,) if isinstance(end, RoutePlace) else self._exits, is_out=end == EXIT)
+
+    def _way(self, start: RoutePlace, ends: Sequence[RoutePlace], *, is_out: bool) -> Route:
+        """The cheapest route to one of some places; on the way out without lifts."""
+        if not ends:
+            raise EchostepError("the plan shows no exit")
+        a = self._cell(start, "the start")
+        cells = {self._cell(end, "the destination"): end for end in ends}
+        serves = self._serves & ~(is_out & self._lift[:, None])
+        trail = _search(
+            self._blocked, self._tight, self._connector, serves, self._height, self._lift, a, np.array(list(cells))
+        )
         if not len(trail):
+            to = "an exit" if is_out else f"({ends[0].x_m:.1f}, {ends[0].y_m:.1f})"
             raise EchostepError(
-                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
+                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to {to}: is a door missing in the plan?"
             )
-        return Route(tuple(self._stretches(trail, start, end)))
+        level, row, column = trail[-1].tolist()
+        return Route(tuple(self._stretches(trail, start, cells[level, row, column])))
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
         """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is in between."""
@@ -179,9 +206,9 @@ class Routes:
 @kernel
 def _search(
     blocked: Bools, tight: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
-    start: tuple[int, int, int], end: tuple[int, int, int],
+    start: tuple[int, int, int], ends: Ints,
 ) -> Ints:  # fmt: skip
-    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) without a route [Dijkstra 1959].
+    """The cheapest trail of cells (k, 3) to one of the ends (n, 3): level, row, column; (0, 3) without a route [Dijkstra 1959].
 
     `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns). `serves` (connectors, levels).
     """
@@ -190,12 +217,15 @@ def _search(
     cost = np.full(levels * size, np.inf)
     before = np.full(levels * size, -1, np.int64)
     first = start[0] * size + start[1] * columns + start[2]
-    last = end[0] * size + end[1] * columns + end[2]
-    cost[first] = 0.0
+    is_end = np.zeros(levels * size, np.bool_)
+    for k in range(len(ends)):
+        is_end[ends[k, 0] * size + ends[k, 1] * columns + ends[k, 2]] = True
+    cost[first], last = 0.0, -1
     heap = [(0.0, first)]
     while heap:
         spent, here = heapq.heappop(heap)
-        if here == last:
+        if is_end[here]:
+            last = here
             break
         if spent > cost[here]:
             continue
@@ -225,7 +255,7 @@ def _search(
 
 @part
 def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
-    """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it was not reached."""
+    """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it is -1: none was reached."""
     count, cell = 1, last
     while cell != first and cell >= 0:
         cell, count = before[cell], count + 1

@@ -25,8 +25,7 @@ from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.recording import Recording, clock_of, utc_offset_ns
 from echostep.tracker import Tracker
 from echostep_app.extras import lacks
-from echostep_app.guidance.guided_rescue import GuidedRescue
-from echostep_app.guidance.guided_run import guidance_of
+from echostep_app.guidance.guided_run import GuidedRescue, guidance_of
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView

@@ -19,7 +19,7 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
 from echostep_app.page import requests
-from echostep_app.page.elements.guidance import Destination, RouteFinder
+from echostep_app.page.elements.guidance import Destination
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
 from echostep_app.page.elements.scene import status_text
 from echostep_app.page.elements.taps import Taps
@@ -27,7 +27,7 @@ from echostep_app.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import SceneHistory
 from echostep_app.page.player import Player
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import RoutePlace, Routes
 from page.frames import LOCAL, PLAN, scene, told
 from plan.imported_plans import seven_floors
 
@@ -67,14 +67,14 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     upstairs = Destination(RoutePlace(13.0, 4.5, 2)).guidance_at(here)
     assert upstairs.text == "Looking for a way, 2 floors up"
     assert destination.needs_route(here)
-    destination.set_route(RouteFinder(PLAN).find(here, goal), "", here)
+    destination.set_route(Routes(PLAN).way(RoutePlace(9.0, 7.5), goal), "", here)
     way = destination.guidance_at(here)
     assert not destination.needs_route(here)
     assert (way.left_m or 0.0) > 5.5  # through the door at (13, 6.5)
     assert way.path[-1] == (13.0, 4.5)
     assert abs(way.arrow_rad or 0.0) < 0.3
     with pytest.raises(EchostepError) as outside:
-        RouteFinder(PLAN).find(here, RoutePlace(500.0, 500.0))
+        Routes(PLAN).way(RoutePlace(9.0, 7.5), RoutePlace(500.0, 500.0))
     destination.set_route(None, str(outside.value), here)
     none = destination.guidance_at(here)
     assert "No way was found: the destination (500.0, 500.0) is outside the plan" in none.text
@@ -161,12 +161,12 @@ def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) ->
 @pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
 def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
     """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""
-    rng, finder, found = np.random.default_rng(1), RouteFinder(plan), 0
+    rng, routes, found = np.random.default_rng(1), Routes(plan), 0
     for _ in range(60):
         x, y, u, v = (float(rng.uniform(0.3, most)) for most in (24.0, 13.0, 24.0, 13.0))
         level, goal = (int(k) for k in rng.integers(0, len(plan.levels), 2))
         try:
-            route = finder.find(replace(told(x, y), level=level), RoutePlace(u, v, goal))
+            route = routes.way(RoutePlace(x, y, level), RoutePlace(u, v, goal))
         except EchostepError:
             continue
         found += 1
