@@ -44,6 +44,7 @@ class GuidedReturn(CueList):
         self._since_end = Odometer()
         self._least_m = math.inf  # least length of the way back since the return began
         self._guide: Guide | None = None  # of the return; None on the way in
+        self.is_wanted = False  # the wearer asks for the way back, wherever the walk has turned
         tracker.watchers.append(self._watch)
 
     @property
@@ -66,6 +67,8 @@ class GuidedReturn(CueList):
         """The cue on the way in: direction and length of the way back; the return's cue when it begins here."""
         if e.claims_place:
             self._since_end.add(self._way.add(e.x_m, e.y_m, e.z_m))
+            if self.is_wanted:
+                return self._begin(e)
             progress_m, off_m = _nearest(self._line, e)
             if progress_m > TURN_M and off_m < _limit_m(e):
                 self._way.go_back_to(way_m(self._line) - progress_m)

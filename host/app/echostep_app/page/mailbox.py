@@ -22,7 +22,7 @@ from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.plan.places.bearing import north_rad
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import Goal
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
 
@@ -95,7 +95,8 @@ class Mailbox:
         self.failure = ""  # the error that ends the run, in words
         self._keeps = keeps
         self.latest: PageScene | None = None
-        self.goal: RoutePlace | None = None
+        self.goal: Goal | None = None
+        self.goes_back = False  # without an exit the run itself guides to it: back along the own way
         self.errand = ""  # who sent the wearer to the destination, in words
         self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
         self._drawings: tuple[
@@ -117,7 +118,7 @@ class Mailbox:
         self.latest = scene
         self._announce()
 
-    def set_goal(self, goal: RoutePlace | None, errand: str = "") -> None:
+    def set_goal(self, goal: Goal | None, errand: str = "") -> None:
         """Set the destination of all pages and call `on_publish`; None ends the guidance to it. `errand`: who sent the wearer there, in words."""
         self.goal, self.errand = goal, errand
         self._announce()

@@ -25,7 +25,7 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.player import Player
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import EXIT, RoutePlace
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -92,8 +92,8 @@ class PageSession(GuardedSocket):
                 refusal = self._tell_team(request)
             case requests.GoTo() if request.level < levels:
                 self._mailbox.set_goal(request.goal)
-            case requests.EndGuidance():
-                self._mailbox.set_goal(None)
+            case requests.GoOut() | requests.EndGuidance():
+                self._mailbox.set_goal(EXIT if isinstance(request, requests.GoOut) else None)
             case requests.SetPlaying() | requests.SetSpeed() | requests.Seek() | requests.Step() if self._player:
                 self._player.handle(request)
                 self._frame_due = True
@@ -187,10 +187,11 @@ class PageSession(GuardedSocket):
 
     def _guidance(self, scene: PageScene) -> ShownGuidance | None:
         """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""
-        if not (scene.estimate and self._destination):
+        if not (scene.estimate and self._destination) or (scene.guidance and scene.guidance.own):
             return scene.guidance
         guidance = self._destination.guidance_at(scene.estimate)
-        if self._destination.needs_route(scene.estimate):
+        is_searched = not (self._mailbox.goes_back and self._destination.goal == EXIT)
+        if is_searched and self._destination.needs_route(scene.estimate):
             self._destination.searching = True
             task = asyncio.create_task(self._search(self._destination, scene.estimate))
             self._searches.add(task)

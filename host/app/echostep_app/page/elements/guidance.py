@@ -116,6 +116,8 @@ class Destination:
         """The next cue of the route; when the estimate has left the route, a new search becomes due."""
         assert self._guide
         cue = self._guide.cue(estimate)
+        if self.goal == EXIT and self._last is None:
+            cue = replace(cue, spoken=f"Way out. {cue.spoken}")
         if cue.kind is CueKind.OFF and self._search_again_s == math.inf:
             self._search_again_s = estimate.t_s
         return guidance_of_cue(cue, self._guide.route, estimate.level, self._last[1] if self._last else None)

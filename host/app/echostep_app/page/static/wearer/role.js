@@ -60,6 +60,7 @@ export class Wearer {
       if ($('met').value) send('met', { name: $('met').value });
       $('met').value = '';
     };
+    $('way-out').onclick = () => this.goalChosen('exit');
     $('goal').onchange = () => this.goalChosen($('goal').value);
     $('sheet-go').onclick = () => {
       const { x_m, y_m, level } = this.taps.ghost;
@@ -248,6 +249,10 @@ export class Wearer {
     if (value === 'map') return this.enter('go', true);
     this.enter(null);
     if (!value) return this.page.send('go_nowhere');
+    if (value === 'exit') {
+      this.speech.set(true);
+      return this.page.send('go_out');
+    }
     const [level, room] = value.split(' ').map(Number);
     $('goal').value = value;
     return this.go(this.page.plan.levels[level].rooms[room].at_m, level);
