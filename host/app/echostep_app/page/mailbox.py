@@ -22,7 +22,7 @@ from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.plan.places.bearing import north_rad
-from echostep_app.plan.routing import Goal
+from echostep_app.plan.routing import EXIT, Goal
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
 
@@ -129,8 +129,10 @@ class Mailbox:
         self._announce()
 
     def set_orders(self, orders: tuple[ShownOrder, ...]) -> None:
-        """Replace the commanders' orders; calls `on_publish` when they have changed."""
+        """Replace the commanders' orders; calls `on_publish` when they have changed. A new one to leave makes the exit the destination."""
         if orders != self.orders:
+            if {order.id for order in orders if order.urgent} - {order.id for order in self.orders}:
+                self.goal, self.errand = EXIT, ""
             self.orders = orders
             self._announce()
 

@@ -11,6 +11,7 @@ import pytest
 from echostep.plan import Door
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
+from echostep_app.page.elements.marks import ShownOrder
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import PageServer
@@ -45,6 +46,25 @@ def test_the_way_out_is_one_tap_and_is_spoken(browser: Any, tmp_path: Any) -> No
         wait_for(page, "said.at(-1) === 'You are outside.'")
         page.select_option("#goal", "")
         wait_for(page, "document.querySelector('#guidance').hidden")
+        assert not page.wrong
+
+
+def test_the_order_to_leave_shows_and_speaks_the_way_out(browser: Any) -> None:
+    mailbox = Mailbox(HOUSE, "test", replay=False)
+    order = ShownOrder("everybody 1", "Ann: Everybody out!", urgent=True)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(replace(scene(), estimate=told(12.0, 5.0), particles=None))
+        page = loaded_page(browser, server.url, LOOKS["bright"], READY, SPEECH)
+        mailbox.set_orders((replace(order, id="note 1", urgent=False),))
+        wait_for(page, "said.includes('Ann: Everybody out!')")
+        assert page.evaluate("echostep.last.goal") is None  # a note sends nobody out
+        mailbox.set_orders((order,))
+        wait_for(page, "said.at(-1) === 'Ann: Everybody out! Straight ahead.'")
+        assert page.evaluate(SHOWN).startswith("Straight ahead\n9 m to go")
+        page.click("#understood")
+        mailbox.set_orders(())
+        mailbox.publish(replace(scene(), estimate=told(20.5, 5.0, t_s=9.0), particles=None))
+        wait_for(page, "said.at(-1) === 'You are outside.'")
         assert not page.wrong
 
 

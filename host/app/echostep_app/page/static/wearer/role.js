@@ -150,9 +150,12 @@ export class Wearer {
     if (marks) panel.marks(marks);
     extend(scene.trail, received.trail);
     speech.alarm(play ? null : alarm);
-    if (!alarm) speech.update(received.guidance);
+    const leaves = !play && received.goal === 'exit';
+    if (leaves && !this.leaves) speech.set(true);
+    this.leaves = leaves;
+    if (!alarm) speech.update(received.guidance, this.orders.isUrgent);
     if (!play && !alarm) speech.sent(received.errand);
-    this.orders.show(play ? [] : received.orders);
+    this.orders.show(play ? [] : received.orders, leaves ? received.guidance : null);
     panel.frame(received);
     this.taps.undoable(received.undo);
     page.showFloors();
@@ -249,10 +252,7 @@ export class Wearer {
     if (value === 'map') return this.enter('go', true);
     this.enter(null);
     if (!value) return this.page.send('go_nowhere');
-    if (value === 'exit') {
-      this.speech.set(true);
-      return this.page.send('go_out');
-    }
+    if (value === 'exit') return this.page.send('go_out');
     const [level, room] = value.split(' ').map(Number);
     $('goal').value = value;
     return this.go(this.page.plan.levels[level].rooms[room].at_m, level);
