@@ -36,6 +36,7 @@ from echostep_app.operation.words import (
     summary_words,
 )
 from echostep_app.page.elements.marks import ShownMark
+from echostep_app.plan.routing import RoutePlace, Routes
 from echostep_app.team.commander import rejected
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.crews import Crew
@@ -80,6 +81,7 @@ class _Followed:
 
     number: int
     state: MemberState | None = None
+    exit: tuple[RoutePlace | None, float | None] = (None, None)  # the length of the way out from a place
     history: deque[ShownEvent] = field(default_factory=lambda: deque(maxlen=MOST_EVENTS))
 
 
@@ -93,6 +95,7 @@ class Operation:
         self._board = MarkBoard()
         self._shared: Shared = ((), (), ())
         self._trails = Trails()
+        self._routes = Routes(plan)
         self._followed: dict[Key, _Followed] = {}
         self._next_number = 1
         self._lock = threading.Lock()
@@ -106,7 +109,7 @@ class Operation:
         with self._lock:
             made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
             made._followed = {key: replace(f, history=f.history.copy()) for key, f in self._followed.items()}
-            made._next_number = self._next_number
+            made._next_number, made._routes = self._next_number, self._routes
         return made
 
     def receive(
@@ -286,13 +289,25 @@ class Operation:
         """Make the list anew; marks on this plan, crews and notes stay the same objects while they are the same."""
         duplicates = self.roster.duplicates(now_s)
         self._rows = tuple(
-            shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates, self._board)
+            shown_wearer(
+                followed.number, m, self.plan, now_s, duplicates, self._board, self._exit_m(followed, m, now_s)
+            )
             for m in members
-            if m.key in self._followed
+            if (followed := self._followed.get(m.key))
         )
         shared = shown_shared(self._board, self.plan, unix_s)
         self._shared = self._shared if shared == self._shared else shared
         self._listed_s, self._changed = now_s, False
+
+    def _exit_m(self, followed: _Followed, m: Member, now_s: float) -> float | None:
+        """How far the exit is; looked for again when the wearer has moved."""
+        p, level = m.position(now_s), level_on(self.plan, m)
+        if p is None or level is None:
+            return None
+        place = RoutePlace(round(p.x_m), round(p.y_m), level)
+        if followed.exit[0] != place or followed.exit[1] is None:
+            followed.exit = place, self._routes.exit_m(RoutePlace(p.x_m, p.y_m, level))
+        return followed.exit[1]
 
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")

@@ -110,12 +110,14 @@ def shown_shared(board: MarkBoard, plan: Plan, unix_s: float) -> Shared:
 
 
 def shown_wearer(
-    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard
-) -> ShownWearer:
-    """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
+    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard,
+    exit_m: float | None = None,
+) -> ShownWearer:  # fmt: skip
+    """The row of a member: "2nd floor, near stairs B, within 0.4 m, 23 m to the exit, heard 2 s ago"."""
     state, p = m.state(now_s), m.position(now_s)
     place = () if p is None else place_words(p) if m.report.position else last_place_words(p)
-    parts = [STATES[state], *place, heard_words(m.silent_s(now_s))]
+    out = "" if exit_m is None else f"{exit_m:.0f} m to the exit"
+    parts = [STATES[state], *place, out, heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
     remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
     ack = board.acks.get(key) if key else None

@@ -10,11 +10,11 @@ from __future__ import annotations
 import heapq
 import math
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
@@ -48,6 +48,8 @@ class RoutePlace:
 
 
 Goal = RoutePlace | Literal["exit"]
+Cell = tuple[int, int, int]  # level, row, column
+Before = NDArray[np.int32]  # index of a cell's predecessor (levels, rows, columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,8 @@ class Routes:
         self._plan = plan
         self._lock = threading.Lock()
         self._exits: tuple[RoutePlace, ...] | None = None  # None: no grids yet
+        self._first: threading.Thread | None = None  # searches for `exit_m`
+        self._outwards: Before | None = None  # from each cell the next one to the nearest exit
 
     def _lay(self) -> tuple[RoutePlace, ...]:
         """Lay the grids; returns the exits; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
@@ -121,25 +125,48 @@ class Routes:
         with self._lock:
             if self._exits is None:
                 self._exits = self._lay()
-            return self._way(start, (end,) if isinstance(end, RoutePlace) else self._exits, is_out=end == EXIT)
+            return self._way_to(start, end) if isinstance(end, RoutePlace) else self._way_out(start)
 
-    def _way(self, start: RoutePlace, ends: Sequence[RoutePlace], *, is_out: bool) -> Route:
-        """The cheapest route to one of some places; on the way out without lifts."""
-        if not ends:
-            raise EchostepError("the plan shows no exit")
-        a = self._cell(start, "the start")
-        cells = {self._cell(end, "the destination"): end for end in ends}
-        serves = self._serves & ~(is_out & self._lift[:, None])
-        trail = _search(
-            self._blocked, self._tight, self._connector, serves, self._height, self._lift, a, np.array(list(cells))
-        )
+    def exit_m(self, place: RoutePlace) -> float | None:
+        """Length of the way out; None where there is none, and until the first search, in a thread of its own, is over."""
+        if self._first is None:
+            self._first = threading.Thread(target=self.exit_m, args=(place,), daemon=True)
+            self._first.start()
+        if self._outwards is None and threading.current_thread() is not self._first:
+            return None
+        try:
+            return self.way(place, EXIT).length_m
+        except EchostepError:
+            return None
+
+    def _way_to(self, start: RoutePlace, end: RoutePlace) -> Route:
+        a, b = self._cell(start, "the start"), self._cell(end, "the destination")
+        trail = _trace(self._search([a], b, self._serves), b)[::-1]
         if not len(trail):
-            to = "an exit" if is_out else f"({ends[0].x_m:.1f}, {ends[0].y_m:.1f})"
             raise EchostepError(
-                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to {to}: is a door missing in the plan?"
+                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
+            )
+        return Route(tuple(self._stretches(trail, start, end)))
+
+    def _way_out(self, start: RoutePlace) -> Route:
+        """The route to the nearest exit without lifts; one search from all exits serves every start."""
+        exits = {self._cell(place, "an exit"): place for place in self._exits or ()}
+        if not exits:
+            raise EchostepError("the plan shows no exit")
+        if self._outwards is None:
+            self._outwards = self._search(list(exits), (-1, -1, -1), self._serves & ~self._lift[:, None])
+        trail = _trace(self._outwards, self._cell(start, "the start"))
+        if not len(trail):
+            raise EchostepError(
+                f"there is no way out from ({start.x_m:.1f}, {start.y_m:.1f}): is a door missing in the plan?"
             )
         level, row, column = trail[-1].tolist()
-        return Route(tuple(self._stretches(trail, start, cells[level, row, column])))
+        return Route(tuple(self._stretches(trail, start, exits[level, row, column])))
+
+    def _search(self, starts: list[Cell], end: Cell, serves: Bools) -> Before:
+        return _search(
+            self._blocked, self._tight, self._connector, serves, self._height, self._lift, np.array(starts), end
+        )
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
         """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is in between."""
@@ -206,26 +233,26 @@ class Routes:
 @kernel
 def _search(
     blocked: Bools, tight: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
-    start: tuple[int, int, int], ends: Ints,
-) -> Ints:  # fmt: skip
-    """The cheapest trail of cells (k, 3) to one of the ends (n, 3): level, row, column; (0, 3) without a route [Dijkstra 1959].
+    starts: Ints, end: tuple[int, int, int],
+) -> Before:  # fmt: skip
+    """From each cell the next one on the cheapest trail to one of the starts (n, 3); itself in a start, -1 where no trail was found [Dijkstra 1959].
 
-    `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns). `serves` (connectors, levels).
+    `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns), as the result. `serves` (connectors, levels).
+    The search ends at the cell `end` (level, row, column); at (-1, -1, -1) never.
     """
     levels, rows, columns = blocked.shape
     size = rows * columns
     cost = np.full(levels * size, np.inf)
-    before = np.full(levels * size, -1, np.int64)
-    first = start[0] * size + start[1] * columns + start[2]
-    is_end = np.zeros(levels * size, np.bool_)
-    for k in range(len(ends)):
-        is_end[ends[k, 0] * size + ends[k, 1] * columns + ends[k, 2]] = True
-    cost[first], last = 0.0, -1
-    heap = [(0.0, first)]
+    before = np.full(levels * size, -1, np.int32)
+    last = end[0] * size + end[1] * columns + end[2]
+    heap = [(0.0, np.int64(0)) for _ in range(0)]
+    for i in range(len(starts)):
+        first = starts[i, 0] * size + starts[i, 1] * columns + starts[i, 2]
+        cost[first], before[first] = 0.0, first
+        heapq.heappush(heap, (0.0, first))
     while heap:
         spent, here = heapq.heappop(heap)
-        if is_end[here]:
-            last = here
+        if here == last:
             break
         if spent > cost[here]:
             continue
@@ -250,20 +277,22 @@ def _search(
                 if total < cost[there]:
                     cost[there], before[there] = total, here
                     heapq.heappush(heap, (total, there))
-    return _trace(before, first, last, rows, columns)
+    return before.reshape(blocked.shape)
 
 
-@part
-def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
-    """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it is -1: none was reached."""
-    count, cell = 1, last
-    while cell != first and cell >= 0:
-        cell, count = before[cell], count + 1
-    trail = np.empty((count if cell == first else 0, 3), np.int64)
-    cell = last
-    for i in range(len(trail) - 1, -1, -1):
-        trail[i] = cell // (rows * columns), cell % (rows * columns) // columns, cell % columns
-        cell = before[cell]
+@kernel
+def _trace(before: Before, cell: tuple[int, int, int]) -> Ints:
+    """The trail of cells (k, 3) from a cell through each cell's predecessor: level, row, column; (0, 3) where there is none."""
+    _, rows, columns = before.shape
+    begin = (cell[0] * rows + cell[1]) * columns + cell[2]
+    flat, here, count = before.ravel(), begin, 1
+    while flat[here] >= 0 and flat[here] != here:
+        here, count = flat[here], count + 1
+    trail = np.empty((count if flat[here] == here else 0, 3), np.int64)
+    here = begin
+    for i in range(len(trail)):
+        trail[i] = here // (rows * columns), here % (rows * columns) // columns, here % columns
+        here = flat[here]
     return trail
 
 
