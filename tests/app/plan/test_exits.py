@@ -13,6 +13,7 @@ import shapely
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import Connector, Door, Level, Plan, load_plan
+from echostep_app.plan.closures import OpenWays, stroke
 from echostep_app.plan.routing import EXIT, RoutePlace, Routes
 from echostep_studies.frame.recordings import DATA
 from naive.ways import ShortestWalks
@@ -120,6 +121,28 @@ def test_the_way_out_is_the_shortest_one_and_takes_no_lift() -> None:
         Routes(house(*plan.levels, kind="lift")).way(RoutePlace(12.0, 5.0, 1), EXIT)
     with pytest.raises(EchostepError, match="shows no exit"):
         Routes(house(level(0.0, Door(INNER)))).way(RoutePlace(4.0, 5.0), EXIT)
+
+
+def test_a_passage_that_is_struck_out_is_gone_round() -> None:
+    plan = house(level(0.0, Door(SOUTH), Door(EAST), Door(INNER)), level(3.5, Door(INNER)))
+    start, ways = RoutePlace(19.0, 5.5), OpenWays(plan)
+    assert ways.past(()).way(start, EXIT).length_m < 3.0
+    for near_the_door in (RoutePlace(19.4, 4.6), RoutePlace(20.3, 5.2)):
+        routes = ways.past((near_the_door,))
+        assert routes.way(start, EXIT).stretches[-1].line_m[-1] == pytest.approx((4.5, -0.6))
+        assert ways.past((near_the_door,)) is routes
+    with pytest.raises(EchostepError, match="there is no way out"):
+        ways.past((RoutePlace(20.0, 5.0), RoutePlace(10.0, 5.0))).way(start, EXIT)
+    with pytest.raises(EchostepError, match="there is no way out"):
+        ways.past((RoutePlace(16.0, 5.0, 1),)).way(RoutePlace(12.0, 5.0, 1), EXIT)  # the stairs
+
+
+def test_a_stroke_in_a_corridor_reaches_from_wall_to_wall() -> None:
+    walls = np.array([[0.0, 0.0, 30.0, 0.0], [0.0, 2.4, 30.0, 2.4], [30.0, 0.0, 30.0, 2.4]])
+    closed = stroke(Level("0", 0.0, walls), RoutePlace(12.0, 0.9))
+    assert closed.tolist() == [[12.0, 0.9, 12.0, 0.0], [12.0, 0.9, 12.0, 2.4]]
+    beside = stroke(Level("0", 0.0, walls[:1]), RoutePlace(12.0, 1.0))
+    assert beside.tolist() == [[12.0, 1.0, 12.0, 0.0], [12.0, 1.0, 12.0, 7.0]]
 
 
 def longer(plan: Plan, starts: int) -> list[float]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from echostep.plan import Plan
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.web.faults import Faults
-from echostep_app.plan.routing import Routes
+from echostep_app.plan.closures import OpenWays
 
 
 @dataclass(slots=True)
@@ -27,7 +27,7 @@ class PageCounts:
 class Shared:
     """One router, one judge of check-ins, one list of faults, and the counts. `takes_files`: files may be dropped onto the pages."""
 
-    routes: Routes
+    ways: OpenWays
     taps: Taps
     faults: Faults = field(default_factory=Faults)
     counts: PageCounts = field(default_factory=PageCounts)
@@ -36,8 +36,8 @@ class Shared:
     @classmethod
     def of(cls, plan: Plan, *, takes_files: bool = False) -> Shared:
         """For the pages of a run on this plan."""
-        return cls(Routes(plan), Taps(plan), takes_files=takes_files)
+        return cls(OpenWays(plan), Taps(plan), takes_files=takes_files)
 
     def on(self, plan: Plan) -> Shared:
         """For the same pages, which show a run on another plan from now on."""
-        return replace(self, routes=Routes(plan), taps=Taps(plan))
+        return replace(self, ways=OpenWays(plan), taps=Taps(plan))

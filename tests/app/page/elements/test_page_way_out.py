@@ -11,13 +11,13 @@ import pytest
 from echostep.plan import Door
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep_app.page.elements.marks import ShownOrder
+from echostep_app.page.elements.marks import BLOCKED, ShownMark, ShownOrder
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import EXIT
 from echostep_simulation.scenario import Scenario
-from page.browser import LOOKS, READY, loaded_page, picture, wait_for
+from page.browser import LOOKS, READY, loaded_page, picture, spot, wait_for
 from page.frames import LOCAL, PLAN, scene, told
 from page.test_page_browser import SPEECH
 from plan.test_exits import EAST, INNER, SOUTH, house, level
@@ -46,6 +46,23 @@ def test_the_way_out_is_one_tap_and_is_spoken(browser: Any, tmp_path: Any) -> No
         wait_for(page, "said.at(-1) === 'You are outside.'")
         page.select_option("#goal", "")
         wait_for(page, "document.querySelector('#guidance').hidden")
+        assert not page.wrong
+
+
+def test_a_passage_is_struck_out_by_a_tap_and_the_way_is_made_anew(browser: Any, tmp_path: Any) -> None:
+    mailbox = Mailbox(HOUSE, "test", replay=False)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.publish(replace(scene(), estimate=told(12.0, 5.0), particles=None))
+        page = loaded_page(browser, server.url, LOOKS["bright"], READY)
+        page.click("#way-out")
+        wait_for(page, "echostep.last.guidance?.path.at(-1)?.[0] === 20.6")
+        for x_m in (4.5, 20.6):  # a second tap there takes it back
+            page.touchscreen.tap(*spot(page, 19.6, 5.3))
+            page.click("#sheet-strike")
+            wait_for(page, f"echostep.last.guidance?.path.at(-1)?.[0] === {x_m}")
+            picture(page, f"struck-{x_m}", tmp_path)
+        mailbox.set_marks((ShownMark("1", BLOCKED, 20.0, 5.0, 0, "Ann"),))  # a commander's
+        wait_for(page, "echostep.last.guidance?.path.at(-1)?.[0] === 4.5")
         assert not page.wrong
 
 

@@ -62,11 +62,13 @@ export class Wearer {
     };
     $('way-out').onclick = () => this.goalChosen('exit');
     $('goal').onchange = () => this.goalChosen($('goal').value);
-    $('sheet-go').onclick = () => {
+    const tapped = (kind) => () => {
       const { x_m, y_m, level } = this.taps.ghost;
       this.taps.drop();
-      this.go([x_m, y_m], level);
+      send(kind, { x_m, y_m, level });
     };
+    $('sheet-go').onclick = tapped('go_to');
+    $('sheet-strike').onclick = tapped('strike');
   }
 
   get estimate() { return this.page.scene.frame?.told; }

@@ -30,7 +30,7 @@ export class Taps {
   // The finger is off: ask the server what it would do. `goes`: the place may also become the destination.
   put([x_m, y_m], heading_rad, level, goes) {
     this.ghost = { x_m, y_m, heading_rad, kept_rad: this.desk.keptHeading(), sd_m: this.sd, level };
-    $('sheet-go').hidden = !goes;
+    $('sheet-go').hidden = $('sheet-strike').hidden = !goes;
     $('sheet-here').hidden = !this.desk.mayCheckIn();
     $('sheet-here').disabled = true;
     this.said = '';
