@@ -209,7 +209,7 @@ GuideTo = Annotated[
     typer.Option(
         "--guide",
         metavar="TO",
-        help="Guide the wearer to a room, X,Y[,LEVEL], the nearest exit, or wearer:NAME of the team.",
+        help="Guide the wearer to a room, X,Y[,LEVEL], or the nearest exit.",
     ),
 ]
 

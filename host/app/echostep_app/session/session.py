@@ -16,16 +16,16 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from echostep.errors import EchostepError, words_of
+from echostep.errors import words_of
 from echostep.localization import Estimate
-from echostep.ports.chunks import TEAM, Portion
+from echostep.ports.chunks import Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.recording import Recording, clock_of, utc_offset_ns
 from echostep.tracker import Tracker
 from echostep_app.extras import lacks
-from echostep_app.guidance.guided_run import GuidedRescue, guidance_of
+from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
@@ -185,10 +185,6 @@ class Session:
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if self.recorded is not None:
             return
-        if isinstance(self.guided, GuidedRescue) and broker is None:
-            raise EchostepError(
-                f"--guide wearer:{self.guided.name} needs the team's broker: --publish mqtt://HOST --name YOURS"
-            )
         if outlet is None or publishing is None or broker is None:
             return
         from echostep_app.session.team.subscription import TeamSubscription
@@ -201,14 +197,11 @@ class Session:
             self.page.fault_sources.append(lambda: "" if publishing.fault else subscription.fault)
 
     def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
-        """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""
-        from echostep_app.session.team.feeds import MarkFeed, TeamFeed
+        """Read teammates and beacons, and for a page the commanders' marks."""
+        from echostep_app.session.team.feeds import MarkFeed
         from echostep_app.session.team.teammate_feed import TeammateFeed
 
         page, plan = self.page, self.tracker.plan
-        if isinstance(self.guided, GuidedRescue):
-            feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
-            self.message_sources.append((TEAM, feed.pop))
         teammates = TeammateFeed(subscription, outlet, run, plan)
         self._sinks.append(teammate_sink(teammates, self.tracker, page))
         self.message_sources.append((TEAM_BEACONS, teammates.beacons))
