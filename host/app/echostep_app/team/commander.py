@@ -6,7 +6,6 @@ In: a roster, a plan. Out: a table, or the roster as JSON. Owns nothing.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -31,11 +30,11 @@ TABLE_LINES = 8  # of a table beside its members: title, head, and what is below
 LOW_BATTERY_PERCENT = 20
 NO_ESTIMATE_S = 3.0  # an older estimate is mentioned in the state
 COLUMNS = {
-    "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left", "to start": "right",
+    "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
 DROPPED = (
-    "where", "walked m", "looks", "nearest m", "to start", "floor", "±95% m", "x, y m", "note",
+    "where", "walked m", "looks", "nearest m", "floor", "±95% m", "x, y m", "note",
 )  # in this order where the terminal is too narrow  # fmt: skip
 WORDS = ("name", "floor", "where", "nearest m")  # may be cut short at their end; a cut number would be another number
 NOTHING_HEARD = (
@@ -128,7 +127,6 @@ def _cells(
     m: Member, members: Sequence[Member], plan: Plan, now_s: float, duplicates: set[tuple[str, str]]
 ) -> dict[str, str]:
     r, p, near = m.report, m.position(now_s), nearest(m, members)
-    from_start = _from_start(m, plan)
     return {
         "name": f"{r.team}/{r.name}",
         "state": _state(m, now_s),
@@ -136,7 +134,6 @@ def _cells(
         "±95% m": f"{p.radius95_m:.1f}" if p else "",
         "floor": p.floor_name if p else "",
         "where": "" if p is None else p.where if r.position else f"last: {p.where}" if p.where else "last",
-        "to start": "" if from_start is None else f"{from_start:.0f} m",
         "looks": "" if p is None or p.heading_rad is None else heading_on(plan, m),
         "nearest m": f"{near[0]:.1f} {near[1].report.name}" if near else "",
         "walked m": f"{r.motion.walked_m:.0f}" if r.motion else "",
@@ -214,16 +211,7 @@ def _member(
         "radius95_m": p.radius95_m if (p := m.position(now_s)) else None,
         "clock_ahead_s": round(m.clock_ahead_s, 3),
         "missed": m.missed,
-        "from_start_m": _from_start(m, plan),
         "nearest": {"name": near[1].report.name, "distance_m": near[0]} if near else None,
         "notes": notes(m, plan, now_s, duplicates),
         "report": msgspec.to_builtins(m.report),
     }
-
-
-def _from_start(m: Member, plan: Plan) -> float | None:
-    """Straight distance from the plan's start, m; None on another floor or without a start."""
-    p = m.report.position
-    if p is None or plan.start is None or p.floor != plan.start.level:
-        return None
-    return math.hypot(p.x_m - plan.start.x_m, p.y_m - plan.start.y_m)
