@@ -79,11 +79,11 @@ class Routes:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._lock = threading.Lock()
-        self._exits: tuple[RoutePlace, ...] | None = None  # None: no grids yet
+        self._exits: dict[Cell, RoutePlace] | None = None  # None: no grids yet
         self._first: threading.Thread | None = None  # searches for `exit_m`
         self._outwards: Before | None = None  # from each cell the next one to the nearest exit
 
-    def _lay(self) -> tuple[RoutePlace, ...]:
+    def _lay(self) -> dict[Cell, RoutePlace]:
         """Lay the grids; returns the exits; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
         plan = self._plan
         x0, y0, x1, y1 = extent(np.concatenate([level.solid for level in plan.levels]))
@@ -103,7 +103,8 @@ class Routes:
         self._lay_connectors(plan)
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
-        return tuple(RoutePlace(pose.x_m, pose.y_m, pose.level) for pose in exits_of(plan))
+        exits = [RoutePlace(pose.x_m, pose.y_m, pose.level) for pose in exits_of(plan)]
+        return {self._cell(place, "an exit"): place for place in exits}
 
     def _lay_connectors(self, plan: Plan) -> None:
         """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free, or tight where a wall is near.
@@ -125,7 +126,32 @@ class Routes:
         with self._lock:
             if self._exits is None:
                 self._exits = self._lay()
-            return self._way_to(start, end) if isinstance(end, RoutePlace) else self._way_out(start)
+            a = self._cell(start, "the start")
+            if isinstance(end, RoutePlace):
+                b, to = self._cell(end, "the destination"), f"({end.x_m:.1f}, {end.y_m:.1f})"
+                trail = _trace(self._search([a], b, self._serves), b)[::-1]
+            else:
+                trail, to = self._trail_out(a), "an exit"
+            if not len(trail):
+                raise EchostepError(
+                    f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to {to}: is a door missing in the plan?"
+                )
+            level, row, column = trail[-1].tolist()
+            place = end if isinstance(end, RoutePlace) else self._exits[level, row, column]
+            return Route(tuple(self._stretches(trail, start, place)))
+
+    def _trail_out(self, start: Cell) -> Ints:
+        """The trail to the nearest exit, without lifts; one search from all exits serves every start."""
+        if not self._exits:
+            raise EchostepError("the plan shows no exit")
+        if self._outwards is None:
+            self._outwards = self._search(list(self._exits), (-1, -1, -1), self._serves & ~self._lift[:, None])
+        return _trace(self._outwards, start)
+
+    def _search(self, starts: list[Cell], end: Cell, serves: Bools) -> Before:
+        return _search(
+            self._blocked, self._tight, self._connector, serves, self._height, self._lift, np.array(starts), end
+        )
 
     def exit_m(self, place: RoutePlace) -> float | None:
         """Length of the way out; None where there is none, and until the first search, in a thread of its own, is over."""
@@ -138,35 +164,6 @@ class Routes:
             return self.way(place, EXIT).length_m
         except EchostepError:
             return None
-
-    def _way_to(self, start: RoutePlace, end: RoutePlace) -> Route:
-        a, b = self._cell(start, "the start"), self._cell(end, "the destination")
-        trail = _trace(self._search([a], b, self._serves), b)[::-1]
-        if not len(trail):
-            raise EchostepError(
-                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
-            )
-        return Route(tuple(self._stretches(trail, start, end)))
-
-    def _way_out(self, start: RoutePlace) -> Route:
-        """The route to the nearest exit without lifts; one search from all exits serves every start."""
-        exits = {self._cell(place, "an exit"): place for place in self._exits or ()}
-        if not exits:
-            raise EchostepError("the plan shows no exit")
-        if self._outwards is None:
-            self._outwards = self._search(list(exits), (-1, -1, -1), self._serves & ~self._lift[:, None])
-        trail = _trace(self._outwards, self._cell(start, "the start"))
-        if not len(trail):
-            raise EchostepError(
-                f"there is no way out from ({start.x_m:.1f}, {start.y_m:.1f}): is a door missing in the plan?"
-            )
-        level, row, column = trail[-1].tolist()
-        return Route(tuple(self._stretches(trail, start, exits[level, row, column])))
-
-    def _search(self, starts: list[Cell], end: Cell, serves: Bools) -> Before:
-        return _search(
-            self._blocked, self._tight, self._connector, serves, self._height, self._lift, np.array(starts), end
-        )
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
         """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is in between."""
