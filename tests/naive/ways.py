@@ -19,7 +19,7 @@ from echostep.arrays import Floats
 from echostep.plan import Plan, Pose
 from echostep_app.plan.routing import BODY_M, CLIMB
 
-CELL_M, MARGIN_M = 0.1, 1.5
+CELL_M, MARGIN_M, NEAR_M = 0.1, 1.5, 0.17
 MOVES = [(u, v) for u in range(-3, 4) for v in range(-3, 4) if math.gcd(u, v) == 1]
 
 
@@ -37,7 +37,8 @@ def shortest_walks(plan: Plan, places: Sequence[Pose]) -> tuple[Floats, Floats]:
     index, edges = np.arange(free.size).reshape(free.shape), []
     for connector in plan.connectors:
         inside = shapely.contains(shapely.Polygon(connector.outline_m), points)
-        free[list(connector.levels)] |= inside
+        for k in connector.levels:  # narrow stairs: close to their walls, but never over one in one move
+            free[k] |= inside & ~shapely.contains(shapely.buffer(walls[k], NEAR_M), points)
         for one, other in pairwise(connector.levels if connector.kind != "lift" else ()):
             rise_m = abs(plan.levels[one].height_m - plan.levels[other].height_m)
             edges.append((index[one][inside], index[other][inside], CLIMB * rise_m))
