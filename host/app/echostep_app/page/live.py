@@ -100,10 +100,8 @@ class LivePage:
         self._trail_breaks = False  # before its next point
         self._check_ins = (0, 0)  # check-ins and undoings
         self._undo_clock, self._numbers, self._steady = UndoClock(), PlaceNumbers(), SteadyStatus()
-        self._back: GuidedReturn | None = None  # the way out where the plan shows no exit
-        if not (replay or (tracker.plan.is_drawn and tracker.plan.exits)):
-            self._back = guided if isinstance(guided, GuidedReturn) else GuidedReturn(tracker)
-            self.mailbox.goes_back = True
+        self.mailbox.goes_back = not (replay or (tracker.plan.is_drawn and tracker.plan.exits))
+        self._back = GuidedReturn(tracker, is_wanted=False) if self.mailbox.goes_back else None
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self.mailbox.publish(self._scene)
