@@ -11,9 +11,12 @@ import pytest
 from echostep_app.operation import trails
 from echostep_app.operation.operation import MOST_EVENTS
 from echostep_app.operation.words import heard_words, tilt_words
+from echostep_app.team.messages.marks import Mark
 from echostep_app.team.messages.report import ReportedAlarm, decode, encode
 from operation.teams import TOWER, Team, place, whole_team
+from page.elements.test_page_way_out import HOUSE
 from team.team_reports import POSITION, report
+from waiting import until
 
 
 def columns(raw: bytes, width: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
@@ -69,6 +72,25 @@ def test_places_are_those_of_the_reports() -> None:
     assert np.isnan(rows[numbers["Kim"]][3])
     assert np.isnan(rows[numbers["Kim"]][5])
     assert numbers["Bo"] not in rows
+
+
+def test_how_far_the_exit_is_from_each_wearer() -> None:
+    plan = replace(HOUSE, digest="7" * 64)
+    team = Team(plan)
+    for name, x_m, floor in (("Kim", 12.0, 0), ("Bo", 12.0, 1)):
+        team.hear(name, place(plan, x_m, 5.0, floor))
+    team.hear("Eve", None)
+    words: dict[str, str] = {}
+
+    def are_said() -> bool:
+        team.pass_time(1.0)
+        words.update({row.name: row.words for row in team.scene().rows})
+        return "9 m to the exit" in words["Kim"] and "m to the exit" in words["Bo"]
+
+    assert until(are_said)  # the grids are laid in a thread
+    assert "exit" not in words["Eve"]
+    team.put_bytes(*Mark(1, "0123abcd", "blocked", 20.0, 5.0, 0, "Ann", team.unix_s, plan.digest).message)
+    assert until(lambda: not are_said() and "10 m to the exit" in words["Kim"])  # by the other door
 
 
 def test_a_wearer_on_another_plan_has_no_place_on_this_one_and_it_is_said() -> None:

@@ -17,7 +17,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Connector, Door, Level, Plan, load_plan
 from echostep_app.plan.closures import OpenWays, stroke
 from echostep_app.plan.cropping import is_clear
-from echostep_app.plan.routing import CLIMB, EXIT, RoutePlace, Routes
+from echostep_app.plan.routing import CLIMB, EXIT, Goal, Route, RoutePlace, Routes
 from echostep_studies.frame.recordings import DATA
 from naive.ways import CELL_M, shortest_walks
 from needs_data import needs_data
@@ -122,21 +122,28 @@ def test_a_stroke_in_a_corridor_reaches_from_wall_to_wall() -> None:
 
 
 def longer(plan: Plan, starts: int) -> list[float]:
-    """How much longer than the shortest walk the ways out from random places are; none may meet a wall."""
-    routes, (low, walked_m), ratios = Routes(plan), shortest_walks(plan, plan.exits), []
+    """How much longer than the shortest walk the ways out from random places are; neither these nor ways between the places may meet a wall."""
+    routes, (low, walked_m), ratios, before = Routes(plan), shortest_walks(plan, plan.exits), [], None
     for k, column, row in np.random.default_rng(1).permutation(np.argwhere(~np.isnan(walked_m)))[:starts].tolist():
         x, y = low + (np.array([column, row]) + 0.5) * CELL_M
-        try:
-            way = routes.way(RoutePlace(x, y, k), EXIT)
-        except EchostepError:
-            assert not np.isfinite(walked_m[k, column, row]), (x, y, k)
-            continue
-        for stretch in way.stretches:
+        here = RoutePlace(x, y, k)
+        ways = [way for to in (EXIT, before) if to and (way := way_or_none(routes, here, to))]
+        for stretch in (stretch for way in ways for stretch in way.stretches):
             line = stretch.line_m.tolist()
-            assert all(is_clear(plan.levels[stretch.level].solid, a, b) for a, b in pairwise(line)), (x, y, k)
-        rise_m = np.abs(np.diff([plan.levels[stretch.level].height_m for stretch in way.stretches])).sum()
-        ratios.append((way.length_m + CLIMB * rise_m) / walked_m[k, column, row])
+            assert all(is_clear(plan.levels[stretch.level].solid, a, b) for a, b in pairwise(line)), (here, before)
+        out, before = way_or_none(routes, here, EXIT), here
+        assert out or not np.isfinite(walked_m[k, column, row]), here
+        if out:
+            rise_m = np.abs(np.diff([plan.levels[stretch.level].height_m for stretch in out.stretches])).sum()
+            ratios.append((out.length_m + CLIMB * rise_m) / walked_m[k, column, row])
     return ratios
+
+
+def way_or_none(routes: Routes, here: RoutePlace, to: Goal) -> Route | None:
+    try:
+        return routes.way(here, to)
+    except EchostepError:
+        return None
 
 
 def test_ways_out_of_a_small_house_are_the_shortest() -> None:

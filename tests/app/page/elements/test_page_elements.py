@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.path import PathSegment
-from echostep.plan import Plan, Pose
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
@@ -150,30 +148,6 @@ def test_a_step_ahead_changes_the_status_only_where_it_widens_the_radius(
     """Half of the probability may be within 5 m of a position whose 95 % radius is 11 m: it stays `uncertain` while a foot lands."""
     last, landed = told(sd_m=sd_m, status=status), PathSegment(1.0, 2.0, 0.7, 0.0, 0.0, 0.0, step_sd_m, 0.0, 2)
     assert status_text(extrapolate(last, landed, [landed])) == then
-
-
-def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:
-    walls = shapely.STRtree(shapely.linestrings(plan.levels[level].solid.reshape(-1, 2, 2)))
-    return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
-def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
-    """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""
-    rng, routes, found = np.random.default_rng(1), Routes(plan), 0
-    for _ in range(60):
-        x, y, u, v = (float(rng.uniform(0.3, most)) for most in (24.0, 13.0, 24.0, 13.0))
-        level, goal = (int(k) for k in rng.integers(0, len(plan.levels), 2))
-        try:
-            route = routes.way(RoutePlace(x, y, level), RoutePlace(u, v, goal))
-        except EchostepError:
-            continue
-        found += 1
-        for stretch in route.stretches:
-            if len(stretch.line_m) > 1:
-                assert not crosses_a_wall(plan, stretch.level, stretch.line_m.tolist()), (x, y, u, v)
-    assert found > 40
 
 
 def test_what_a_tap_would_do_is_said_before() -> None:
