@@ -37,10 +37,18 @@ class CueKind(StrEnum):
 Choice = tuple[CueKind, str, float | None]  # kind, words, direction from straight ahead (rad)
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
 NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
-# Direction beyond which the target is behind, assumed.
-AROUND_RAD = math.radians(135.0)
-RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, assumed
-LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts again, assumed
+AHEAD_M = 3.0  # of the arrow's target along the route [Fischer 2008, 4.2]
+# Assumed:
+ARRIVED_M = 1.0  # from the end: the wearer has arrived
+OFF_M = 2.0  # distance from the route, beyond the 95 % radius, that is off it: the width of a corridor
+SILENCE_S = 3.0  # without beacon contact before the wearer is sent back
+HEADING_SD_RAD = math.radians(45.0)  # greatest standard deviation of a usable heading
+TURN_RAD = math.radians(30.0)  # least angle of a cue to turn
+AROUND_RAD = math.radians(135.0)  # direction beyond which the target is behind
+ARROW_S, ARROW_RAD_S = 0.5, math.pi  # time constant of the arrow, and its greatest rate
+SAY_AGAIN_S = 8.0  # least time before a sentence is repeated
+RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place
+LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts again
 ARROWS = "↑↖←↙↓↘→↗"
 
 
@@ -61,27 +69,6 @@ class Cue:
     aim_rad: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class GuidanceSettings:
-    """Limits of guidance.
-
-    `ahead_m`: the target's distance along the route [Fischer 2008, 4.2]. `arrived_m`: distance from the end at which the wearer has arrived.
-    `off_m`: distance from the route, beyond the 95 % radius, that counts as off it. `silence_s`: time without beacon contact before the wearer is
-    sent back. `heading_sd_deg`: greatest standard deviation of a usable heading. `turn_deg`: least angle of a cue to turn. `arrow_s`: time constant
-    of the arrow, `arrow_deg_s` its greatest rate. `say_again_s`: least time before a sentence is repeated.
-    """
-
-    ahead_m: float = 3.0
-    arrived_m: float = 1.0
-    off_m: float = 2.0
-    silence_s: float = 3.0
-    heading_sd_deg: float = 45.0
-    turn_deg: float = 30.0
-    arrow_s: float = 0.5
-    arrow_deg_s: float = 180.0
-    say_again_s: float = 8.0
-
-
 class Guide:
     """Guides one wearer along one route.
 
@@ -91,7 +78,6 @@ class Guide:
     def __init__(
         self,
         route: Route,
-        settings: GuidanceSettings | None = None,
         again: Callable[[RoutePlace], Route] | None = None,
         arrived: str = "You have arrived",
     ) -> None:
@@ -100,7 +86,6 @@ class Guide:
             raise EchostepError("a route needs at least one stretch")
         self.route = route
         self.arrived = arrived
-        self._settings = settings or GuidanceSettings()
         self._again = again
         self._stretch = 0
         self._progress_m = 0.0
@@ -111,7 +96,6 @@ class Guide:
         self._known_level: int | None = None  # of the last known place; None before the first
         self._last_text = ""
         self._spoken_s = -math.inf
-        self.replanned = 0
 
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
         """The cue at this estimate; `heard_s`: when a beacon last measured, None without beacons."""
@@ -121,7 +105,7 @@ class Guide:
         """What to do at this estimate. A reached end counts, whether beacons measure there or not."""
         lost = not e.claims_place
         back, silent = self._update_contact(e, heard_s, lost)
-        if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
+        if e.heading_sd_rad > HEADING_SD_RAD:
             return CueKind.STOP, NO_HEADING, None
         if self._known_level is None:
             return CueKind.STOP, NEVER_KNOWN, None
@@ -140,15 +124,15 @@ class Guide:
 
     def _update_contact(self, e: Estimate, heard_s: float | None, lost: bool) -> tuple[bool, bool]:
         """Update the contact; whether the wearer is to go back, and whether no beacon measures. An estimate that is not lost any more is known."""
-        contact, silence_s = self._contact, self._settings.silence_s
+        contact = self._contact
         known_s = e.t_s if heard_s is None or self._was_lost else heard_s
         if not lost and self._known_level is None:
             start_contact(contact, known_s, e.x_m, e.y_m)
         if not lost and (self._known_level is None or known_s > contact["known_s"]):
             self._known_level = e.level
         self._was_lost = lost
-        back = update_contact(contact, e.t_s, known_s, e.x_m, e.y_m, lost, silence_s)
-        return back, bool(e.t_s - contact["known_s"] > allowed_silence(contact, silence_s))
+        back = update_contact(contact, e.t_s, known_s, e.x_m, e.y_m, lost, SILENCE_S)
+        return back, bool(e.t_s - contact["known_s"] > allowed_silence(contact, SILENCE_S))
 
     @property
     def left_m(self) -> float:
@@ -172,30 +156,30 @@ class Guide:
             if later:
                 self._stretch = min(later, key=lambda k: (k < self._stretch, abs(k - self._stretch)))
                 self._progress_m = 0.0
-        reach = 2.0 * self._settings.ahead_m
+        reach = 2.0 * AHEAD_M
         progress, off = nearest(self._here.line_m, e.x_m, e.y_m, self._progress_m - reach, self._progress_m + reach)
-        if off > self._settings.off_m:
+        if off > OFF_M:
             progress, off = nearest(self._here.line_m, e.x_m, e.y_m, 0.0, math.inf)
         self._progress_m = progress
 
     def _choose_along(self, e: Estimate) -> Choice:
         """What to do on the route: arrived, change of level, turn, or straight ahead."""
-        s, line = self._settings, self._here.line_m
+        line = self._here.line_m
         off_m = self._off_m(e)
-        if off_m > s.off_m + e.ellipse95.major_m:
+        if off_m > OFF_M + e.ellipse95.major_m:
             return self._choose_off_route(e, off_m)
         if self._has_arrived(e):
             return CueKind.ARRIVED, self.arrived, None
-        arrow = turn_ahead(line, self._progress_m + s.ahead_m, e.x_m, e.y_m, e.heading_rad)
+        arrow = turn_ahead(line, self._progress_m + AHEAD_M, e.x_m, e.y_m, e.heading_rad)
         rest = way_m(line) - self._progress_m
-        if not self._last and rest < s.ahead_m:
+        if not self._last and rest < AHEAD_M:
             after = self.route.stretches[self._stretch + 1].level
             step = "up" if after > e.level else "down"
             return CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow
         side = wrap(arrow)
         if abs(side) > AROUND_RAD:
             return CueKind.TURN, "Turn around", arrow
-        if abs(side) > math.radians(s.turn_deg):
+        if abs(side) > TURN_RAD:
             return CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow
         return CueKind.AHEAD, "Straight ahead", arrow
 
@@ -206,10 +190,10 @@ class Guide:
 
     def _has_arrived(self, e: Estimate) -> bool:
         """Whether the end of the route is reached."""
-        s, end = self._settings, self._here.line_m[-1]
-        if self._off_m(e) > s.off_m + e.ellipse95.major_m:
+        end = self._here.line_m[-1]
+        if self._off_m(e) > OFF_M + e.ellipse95.major_m:
             return False
-        return self.left_m < s.arrived_m or (self._last and math.hypot(e.x_m - end[0], e.y_m - end[1]) < s.arrived_m)
+        return self.left_m < ARRIVED_M or (self._last and math.hypot(e.x_m - end[0], e.y_m - end[1]) < ARRIVED_M)
 
     @property
     def _last(self) -> bool:
@@ -224,8 +208,7 @@ class Guide:
             except EchostepError:
                 return CueKind.STOP, "Stop. No way leads on from here", None
             self._stretch, self._progress_m = 0, 0.0
-            self.replanned += 1
-            arrow = turn_ahead(self._here.line_m, self._settings.ahead_m, e.x_m, e.y_m, e.heading_rad)
+            arrow = turn_ahead(self._here.line_m, AHEAD_M, e.x_m, e.y_m, e.heading_rad)
             return CueKind.OFF, "You left the way. Here is another", arrow
         if self._here.level != e.level:
             return CueKind.STOP, "Stop. You are on the wrong level", None
@@ -235,7 +218,7 @@ class Guide:
     def _make_cue(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
         """A cue with its smoothed arrow, and its sentence unless that was just spoken."""
         arrow = self._smooth(arrow_rad, e.t_s)
-        new = text != self._last_text or e.t_s - self._spoken_s >= self._settings.say_again_s
+        new = text != self._last_text or e.t_s - self._spoken_s >= SAY_AGAIN_S
         spoken = ""
         if new and not (kind is CueKind.AHEAD and text == self._last_text):
             spoken, self._last_text, self._spoken_s = text + ".", text, e.t_s
@@ -244,7 +227,6 @@ class Guide:
 
     def _smooth(self, wanted: float | None, t_s: float) -> float | None:
         """The arrow's new direction: it follows with a time constant and a greatest rate; after it was hidden it starts at `wanted`."""
-        s = self._settings
         if wanted is None:
             self._arrow = None
             return None
@@ -254,8 +236,8 @@ class Guide:
             self._arrow = wrap(wanted)
             return self._arrow
         off = wrap(wanted - self._arrow)
-        turn = off * (1.0 - math.exp(-span_s / s.arrow_s))
-        most = math.radians(s.arrow_deg_s) * span_s
+        turn = off * (1.0 - math.exp(-span_s / ARROW_S))
+        most = ARROW_RAD_S * span_s
         self._arrow = wrap(self._arrow + min(max(turn, -most), most))
         return self._arrow
 

@@ -14,13 +14,12 @@ from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
-from echostep_app.guidance.cues import Guide
+from echostep_app.guidance.cues import OFF_M, Guide
 from echostep_app.guidance.own_way import OwnWay
 from echostep_app.plan.polyline import nearest, way_m
 from echostep_app.plan.routing import Route, RoutePlace, Stretch
 
 REACH_M = 12.0  # of the way back, on which the wearer is looked for: more than the steps of a search in one room
-OFF_M = 2.0  # distance from the way, beyond the 95 % radius, that is off it: the width of a corridor
 BESIDE_M = 3.0  # greatest 95 % radius of the way back beside the way in: a corridor and a half
 
 
@@ -54,7 +53,7 @@ class GuidedReturn(CueList):
             self._guide = None
             self.cues.clear()
             return
-        self._guide = self._guide or Guide(self._way_from(RoutePlace(e.x_m, e.y_m)), None, self._way_from)
+        self._guide = self._guide or Guide(self._way_from(RoutePlace(e.x_m, e.y_m)), self._way_from)
         self.cues.append(self._guide.cue(e, self._tracker.state.beacon_heard_s))
 
     def _walk(self, e: Estimate) -> None:

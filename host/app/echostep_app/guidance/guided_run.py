@@ -87,7 +87,7 @@ class GuidedRun(CueList):
         if self._guide is None and e.t_s - self._searched_s >= AGAIN_S:
             self._searched_s = e.t_s
             with contextlib.suppress(EchostepError):
-                self._guide = Guide(self._again(RoutePlace(e.x_m, e.y_m, e.level)), None, self._again, self._arrived)
+                self._guide = Guide(self._again(RoutePlace(e.x_m, e.y_m, e.level)), self._again, self._arrived)
         if self._guide is None:
             self.cues.append(Cue(e.t_s, CueKind.STOP, NO_WAY, None, "" if self.cues else f"{NO_WAY}."))
         else:
