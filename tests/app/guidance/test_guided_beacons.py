@@ -77,16 +77,7 @@ def test_destinations_are_rooms_or_places() -> None:
 def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "truth.csv", walk.truth[:200], delimiter=",", header="t_s,x,y,heading_rad,z", comments="")
     plan = Path(str(files("echostep") / "plans" / "demo.json"))
-    arguments = [
-        "beacons",
-        "simulate",
-        "--plan",
-        str(plan),
-        "--truth",
-        "truth.csv",
-        "--pace",
-        "100",
-    ]
+    arguments = ["beacons", "simulate", "--plan", str(plan), "--truth", "truth.csv", "--pace", "100"]
     run = echostep(*arguments, "--to", "udp://127.0.0.1:9", cwd=tmp_path, ends=0)
     assert "bytes sent" in run.stdout
     run = echostep(*arguments, "--to", "/dev/nowhere", cwd=tmp_path, ends=2)

@@ -15,15 +15,7 @@ from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.marks import MARKS, Errand, MarkBoard, acks_of, errand_of
-from echostep_app.team.messages.orders import (
-    EVERYBODY,
-    HOLDS_S,
-    NOTE,
-    ORDERS,
-    RECEIPTS,
-    Receipt,
-    receipt_message,
-)
+from echostep_app.team.messages.orders import EVERYBODY, HOLDS_S, NOTE, ORDERS, RECEIPTS, Receipt, receipt_message
 from echostep_app.team.messages.report import BadReportError
 
 

@@ -234,13 +234,13 @@ export class Wearer {
     const before = this.mode, { level } = this.page.scene;
     this.enter(null);
     if (before === 'go') return this.go(position, level);
-    this.taps.put(position, heading_rad, level, false);
+    this.taps.put(position, heading_rad, level);
     $('sheet-here').focus({ preventScroll: true });
   }
 
   tapped(position) {
     if (this.mode === 'measure') this.page.measured(position);
-    else this.taps.put(position, null, this.page.scene.level, true);
+    else this.taps.put(position, null, this.page.scene.level);
   }
 
   moved() {
