@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Guidance: one cue at a time, a smooth arrow, no guidance without knowledge; ways around walls and over stairs."""
+"""Guidance: one cue at a time, no guidance without knowledge; ways around walls and over stairs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
@@ -156,27 +156,9 @@ def test_does_not_jump_to_where_the_way_comes_by_again() -> None:
     assert g.cue(at(2, 3.0, 0.6)).arrow_rad == pytest.approx(0.0, abs=0.4)
 
 
-@given(st.lists(st.floats(-200.0, 200.0), min_size=2, max_size=30))
-@settings(max_examples=50)
-def test_arrow_never_turns_faster_than_its_limit(headings_deg: list[float]) -> None:
-    g, last = guide(), None
-    for k, heading in enumerate(headings_deg):
-        arrow = g.cue(at(0.1 * k, 3.0, 0.0, heading)).arrow_rad
-        assert arrow is not None
-        if last is not None:
-            assert abs(math.remainder(arrow - last, 2 * math.pi)) <= math.radians(18.0) + 1e-9
-        last = arrow
-
-
-def test_arrow_comes_to_rest_where_it_should() -> None:
-    g = guide()
-    for k in range(40):
-        cue = g.cue(at(0.2 * k, 3.0, 0.0, -90))
-    assert cue.arrow_rad == pytest.approx(math.pi / 2, abs=0.01)
-    assert cue.aim_rad == pytest.approx(math.pi / 2)
-    turned = g.cue(at(8.0, 3.0, 0.0, 90))  # a moment later: the aim is there at once, the arrow is not
-    assert turned.aim_rad == pytest.approx(-math.pi / 2)
-    assert (turned.arrow_rad or 0.0) > 0.5
+def test_the_arrow_is_relative_to_the_heading() -> None:
+    cue = guide().cue(at(0, 3.0, 0.0, -90))
+    assert cue.arrow_rad == pytest.approx(math.pi / 2)
     assert arrow_sign(cue.arrow_rad) == "←"
     assert describe_cue(cue).startswith("←  Turn left   17 m")
 

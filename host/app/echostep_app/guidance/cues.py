@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
-In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
-`Contact`: the last known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
+In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, and the `Contact`: the last
+known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
 """
 
 from __future__ import annotations
@@ -45,10 +45,8 @@ SILENCE_S = 3.0  # without beacon contact before the wearer is sent back
 HEADING_SD_RAD = math.radians(45.0)  # greatest standard deviation of a usable heading
 TURN_RAD = math.radians(30.0)  # least angle of a cue to turn
 AROUND_RAD = math.radians(135.0)  # direction beyond which the target is behind
-ARROW_S, ARROW_RAD_S = 0.5, math.pi  # time constant of the arrow, and its greatest rate
 SAY_AGAIN_S = 8.0  # least time before a sentence is repeated
 RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place
-LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts again
 ARROWS = "↑↖←↙↓↘→↗"
 
 
@@ -56,8 +54,7 @@ ARROWS = "↑↖←↙↓↘→↗"
 class Cue:
     """One cue. `arrow_rad`: direction to walk relative to the wearer's heading, counter-clockwise; None: no arrow is shown.
 
-    `spoken` is empty when there is nothing new to say. `left_m`: length of the route ahead. `aim_rad`: direction towards which the arrow is turning,
-    for a view that draws it more often than estimates come.
+    `spoken` is empty when there is nothing new to say. `left_m`: length of the route ahead.
     """
 
     t_s: float
@@ -66,7 +63,6 @@ class Cue:
     arrow_rad: float | None
     spoken: str = ""
     left_m: float = math.nan
-    aim_rad: float | None = None
 
 
 class Guide:
@@ -89,8 +85,6 @@ class Guide:
         self._again = again
         self._stretch = 0
         self._progress_m = 0.0
-        self._arrow: float | None = None
-        self._arrow_s = -math.inf
         self._contact = np.zeros(1, CONTACT)[0]
         self._was_lost = False
         self._known_level: int | None = None  # of the last known place; None before the first
@@ -216,30 +210,13 @@ class Guide:
         return CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow
 
     def _make_cue(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
-        """A cue with its smoothed arrow, and its sentence unless that was just spoken."""
-        arrow = self._smooth(arrow_rad, e.t_s)
+        """A cue, with its sentence unless that was just spoken."""
         new = text != self._last_text or e.t_s - self._spoken_s >= SAY_AGAIN_S
         spoken = ""
         if new and not (kind is CueKind.AHEAD and text == self._last_text):
             spoken, self._last_text, self._spoken_s = text + ".", text, e.t_s
-        aim = None if arrow_rad is None else wrap(arrow_rad)
-        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m, aim)
-
-    def _smooth(self, wanted: float | None, t_s: float) -> float | None:
-        """The arrow's new direction: it follows with a time constant and a greatest rate; after it was hidden it starts at `wanted`."""
-        if wanted is None:
-            self._arrow = None
-            return None
-        span_s = t_s - self._arrow_s
-        self._arrow_s = t_s
-        if self._arrow is None or not 0.0 <= span_s < LONGEST_SPAN_S:
-            self._arrow = wrap(wanted)
-            return self._arrow
-        off = wrap(wanted - self._arrow)
-        turn = off * (1.0 - math.exp(-span_s / ARROW_S))
-        most = ARROW_RAD_S * span_s
-        self._arrow = wrap(self._arrow + min(max(turn, -most), most))
-        return self._arrow
+        arrow = None if arrow_rad is None else wrap(arrow_rad)
+        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m)
 
 
 def arrow_sign(arrow_rad: float | None) -> str:

@@ -33,9 +33,8 @@ COLUMNS = {
     "name": "left", "state": "left", "x, y m": "right", "±95% m": "right", "floor": "left", "where": "left",
     "looks": "right", "nearest m": "left", "walked m": "right", "note": "left",
 }  # fmt: skip
-DROPPED = (
-    "where", "walked m", "looks", "nearest m", "floor", "±95% m", "x, y m", "note",
-)  # in this order where the terminal is too narrow  # fmt: skip
+# In this order where the terminal is too narrow
+DROPPED = ("where", "walked m", "looks", "nearest m", "floor", "±95% m", "x, y m", "note")
 WORDS = ("name", "floor", "where", "nearest m")  # may be cut short at their end; a cut number would be another number
 NOTHING_HEARD = (
     "nothing heard yet: does a tracker publish there, and does the broker's access list let this user read echostep/#?"

@@ -61,7 +61,7 @@ def guidance_of_cue(cue: Cue, route: Route | None, level: int, before: ShownGuid
     spoken = (cue.spoken, cue.t_s) if cue.spoken else previous
     path = () if route is None or math.isnan(cue.left_m) else remaining_path(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
-    return ShownGuidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *spoken)
+    return ShownGuidance(cue.kind.value, cue.text, cue.arrow_rad, left_m, path, *spoken)
 
 
 def remaining_path(route: Route, level: int, left_m: float) -> Points:
@@ -113,12 +113,13 @@ class Destination:
         return self._last[1]
 
     def _along_route(self, estimate: Estimate) -> ShownGuidance:
-        """The next cue of the route; when the estimate has left the route, a new search becomes due."""
+        """The next cue of the route; when the estimate has left the route, or its levels, a new search becomes due."""
         assert self._guide
         cue = self._guide.cue(estimate)
         if self.goal == EXIT and self._last is None:
             cue = replace(cue, spoken=f"Way out. {cue.spoken}")
-        if cue.kind is CueKind.OFF and self._search_again_s == math.inf:
+        is_off = cue.kind is CueKind.OFF or estimate.level not in {s.level for s in self._guide.route.stretches}
+        if is_off and self._search_again_s == math.inf:
             self._search_again_s = estimate.t_s
         return guidance_of_cue(cue, self._guide.route, estimate.level, self._last[1] if self._last else None)
 
