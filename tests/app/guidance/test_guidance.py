@@ -6,8 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +18,7 @@ from echostep.plan import Connector, Level, Plan, load_plan
 from echostep_app.guidance.cues import NEVER_KNOWN, CueKind, Guide, arrow_sign, describe_cue
 from echostep_app.plan.polyline import along, nearest, way_m
 from echostep_app.plan.routing import BODY_M, Route, RoutePlace, Routes, Stretch
+from walks import DEMO
 
 LINE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
 HERE = Estimate(0.0, 0.0, 0.0, 0.01, 0.0, 0.01, 0.0, 0.05, 0, TrackStatus.TRACKING)
@@ -166,12 +165,8 @@ def test_the_arrow_is_relative_to_the_heading() -> None:
 # ---- ways on a plan
 
 
-def demo() -> Plan:
-    return load_plan(Path(str(files("echostep") / "plans" / "demo.json")))
-
-
 def test_ways_keep_off_the_walls_and_reach_every_room() -> None:
-    plan = demo()
+    plan = load_plan(DEMO)
     routes, walls = Routes(plan), plan.levels[0].walls
     start = RoutePlace(2.0, 7.5)
     for room in plan.levels[0].rooms:
@@ -215,7 +210,7 @@ def test_the_way_goes_round_a_wall_between_two_flights_of_stairs(connectors: int
 
 
 def test_who_leaves_the_way_gets_another_one_around_the_walls() -> None:
-    plan = demo()
+    plan = load_plan(DEMO)
     routes = Routes(plan)
     goal = plan.levels[0].rooms[3].at_m
     again = partial(routes.way, end=RoutePlace(*goal))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from echostep.ports.chunks import GATEWAY, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination
 from echostep_app.plan.routing import EXIT, RoutePlace
+from walks import DEMO
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +76,7 @@ def test_destinations_are_rooms_or_places() -> None:
 
 def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "truth.csv", walk.truth[:200], delimiter=",", header="t_s,x,y,heading_rad,z", comments="")
-    plan = Path(str(files("echostep") / "plans" / "demo.json"))
-    arguments = ["beacons", "simulate", "--plan", str(plan), "--truth", "truth.csv", "--pace", "100"]
+    arguments = ["beacons", "simulate", "--plan", str(DEMO), "--truth", "truth.csv", "--pace", "100"]
     run = echostep(*arguments, "--to", "udp://127.0.0.1:9", cwd=tmp_path, ends=0)
     assert "bytes sent" in run.stdout
     run = echostep(*arguments, "--to", "/dev/nowhere", cwd=tmp_path, ends=2)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import shapely
 
-from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.plan import Connector, Level, Plan, load_plan
 from echostep_app.guidance.tours import room_tour, tour
@@ -24,10 +23,6 @@ from echostep_studies.frame.recordings import DATA
 from echostep_studies.noplan import sites as drawn_sites
 from echostep_studies.operation.walks import waypoints as operation_waypoints
 from needs_data import needs_data
-
-TOWER = tower(3)
-DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
 
 PERSON = Person(corner_m=0.3)  # as in the studies
 STOREY_M, INNER_M, OUTER_M = 3.5, 2.0, 3.2  # of a quarter of a winding stair about the origin

@@ -127,11 +127,11 @@ def longer(plan: Plan, starts: int) -> list[float]:
     for k, column, row in np.random.default_rng(1).permutation(np.argwhere(~np.isnan(walked_m)))[:starts].tolist():
         x, y = low + (np.array([column, row]) + 0.5) * CELL_M
         here = RoutePlace(x, y, k)
-        ways = [way for to in (EXIT, before) if to and (way := way_or_none(routes, here, to))]
-        for stretch in (stretch for way in ways for stretch in way.stretches):
-            line = stretch.line_m.tolist()
-            assert all(is_clear(plan.levels[stretch.level].solid, a, b) for a, b in pairwise(line)), (here, before)
-        out, before = way_or_none(routes, here, EXIT), here
+        out, between = (way_or_none(routes, here, to) for to in (EXIT, before or here))
+        for stretch in (stretch for way in (out, between) if way for stretch in way.stretches):
+            walls, line = plan.levels[stretch.level].solid, stretch.line_m.tolist()
+            assert all(is_clear(walls, a, b) for a, b in pairwise(line)), (here, before)
+        before = here
         assert out or not np.isfinite(walked_m[k, column, row]), here
         if out:
             rise_m = np.abs(np.diff([plan.levels[stretch.level].height_m for stretch in out.stretches])).sum()

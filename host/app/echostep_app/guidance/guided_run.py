@@ -71,10 +71,11 @@ class GuidedRun(CueList):
         self._guide: Guide | None = None
         self._searched_s = -math.inf
         at = to if isinstance(to, RoutePlace) else tracker.plan.exits[0]
-        first = Guide(self._again(RoutePlace(at.x_m, at.y_m, at.level)))
-        first.cue(
-            Estimate(0.0, at.x_m + FAR_M, at.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, at.level)
-        )  # lays the grids and compiles the kernels now, not during the run
+        with contextlib.suppress(EchostepError) if to == EXIT else contextlib.nullcontext():
+            first = Guide(self._again(RoutePlace(at.x_m, at.y_m, at.level)))
+            first.cue(
+                Estimate(0.0, at.x_m + FAR_M, at.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, at.level)
+            )  # lays the grids and compiles the kernels now, not during the run
         tracker.watchers.append(self._watch)
 
     @property

@@ -7,6 +7,7 @@ The route is found on a grid [Dijkstra 1959] and then straightened, so that it b
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import math
 import threading
@@ -79,12 +80,13 @@ class Routes:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._lock = threading.Lock()
-        self._exits: dict[Cell, RoutePlace] | None = None  # None: no grids yet
+        self._is_laid = False
+        self._exits: dict[Cell, RoutePlace] = {}
         self._first: threading.Thread | None = None  # searches for `exit_m`
         self._outwards: Before | None = None  # from each cell the next one to the nearest exit
 
-    def _lay(self) -> dict[Cell, RoutePlace]:
-        """Lay the grids; returns the exits; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
+    def _lay(self) -> None:
+        """Lay the grids; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
         plan = self._plan
         x0, y0, x1, y1 = extent(np.concatenate([level.solid for level in plan.levels]))
         self._low = np.array([x0, y0]) - MARGIN_M
@@ -103,8 +105,7 @@ class Routes:
         self._lay_connectors(plan)
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
-        exits = [RoutePlace(pose.x_m, pose.y_m, pose.level) for pose in exits_of(plan)]
-        return {self._cell(place, "an exit"): place for place in exits}
+        self._is_laid = True
 
     def _lay_connectors(self, plan: Plan) -> None:
         """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free, or tight where a wall is near.
@@ -124,8 +125,8 @@ class Routes:
     def way(self, start: RoutePlace, end: Goal) -> Route:
         """The cheapest route; raises EchostepError when a position is outside the plan, or without a route."""
         with self._lock:
-            if self._exits is None:
-                self._exits = self._lay()
+            if not self._is_laid:
+                self._lay()
             a = self._cell(start, "the start")
             if isinstance(end, RoutePlace):
                 b, to = self._cell(end, "the destination"), f"({end.x_m:.1f}, {end.y_m:.1f})"
@@ -142,9 +143,13 @@ class Routes:
 
     def _trail_out(self, start: Cell) -> Ints:
         """The trail to the nearest exit, without lifts; one search from all exits serves every start."""
-        if not self._exits:
-            raise EchostepError("the plan shows no exit")
         if self._outwards is None:
+            for pose in exits_of(self._plan):
+                place = RoutePlace(pose.x_m, pose.y_m, pose.level)
+                with contextlib.suppress(EchostepError):  # one that is drawn into a wall
+                    self._exits[self._cell(place, "an exit")] = place
+            if not self._exits:
+                raise EchostepError("the plan shows no exit")
             self._outwards = self._search(list(self._exits), (-1, -1, -1), self._serves & ~self._lift[:, None])
         return _trace(self._outwards, start)
 

@@ -99,9 +99,7 @@ class Destination:
     def set_route(self, route: Route | None, reason: str, estimate: Estimate) -> None:
         """The result of a search from an estimate: a route, or None and the reason. Without a route it is repeated after `SEARCH_INTERVAL_S`."""
         self.searching = False
-        self._guide = (
-            Guide(route, arrived=ARRIVED[self.goal == EXIT]) if route is not None and route.stretches else None
-        )
+        self._guide = Guide(route, arrived=ARRIVED[self.goal == EXIT]) if route else None
         self._reason, self._last = reason, None
         self._search_again_s = math.inf if self._guide else estimate.t_s + SEARCH_INTERVAL_S
 
