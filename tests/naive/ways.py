@@ -31,9 +31,8 @@ def shortest_walks(plan: Plan, places: Sequence[Pose]) -> tuple[Floats, Floats]:
     points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
     walls = [shapely.union_all(shapely.linestrings(level.solid.reshape(-1, 2, 2))) for level in plan.levels]
     free = np.array([~shapely.contains(shapely.buffer(lines, BODY_M), points) for lines in walls])
-    free[:, [*range(3), *range(-3, 0)]] = free[:, :, [*range(3), *range(-3, 0)]] = (
-        False  # nothing moves over the edge of the grid
-    )
+    edge = [*range(3), *range(-3, 0)]  # over it nothing moves
+    free[:, edge] = free[:, :, edge] = False
     index, edges = np.arange(free.size).reshape(free.shape), []
     for connector in plan.connectors:
         inside = shapely.contains(shapely.Polygon(connector.outline_m), points)

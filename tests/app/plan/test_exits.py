@@ -24,7 +24,6 @@ from needs_data import needs_data
 
 SOUTH, EAST = (4.0, 0.0, 5.0, 0.0), (20.0, 4.5, 20.0, 5.5)  # doors of the outline
 INNER = (10.0, 4.5, 10.0, 5.5)  # of the wall between the two halves
-WESTPORT = DATA / "maps/westport-house.json"
 
 
 OUTLINE = (shapely.box(0.0, 0.0, 20.0, 10.0).exterior, shapely.LineString([(10.0, 0.0), (10.0, 10.0)]))
@@ -115,8 +114,10 @@ def test_a_passage_that_is_struck_out_is_gone_round() -> None:
 
 def test_a_stroke_in_a_corridor_reaches_from_wall_to_wall() -> None:
     walls = np.array([[0.0, 0.0, 30.0, 0.0], [0.0, 2.4, 30.0, 2.4], [30.0, 0.0, 30.0, 2.4]])
-    closed = stroke(Level("0", 0.0, walls), RoutePlace(12.0, 0.9))
-    assert closed.tolist() == [[12.0, 0.9, 12.0, 0.0], [12.0, 0.9, 12.0, 2.4]]
+    assert stroke(Level("0", 0.0, walls), RoutePlace(12.0, 0.9)).tolist() == [
+        [12.0, 0.9, 12.0, 0.0],
+        [12.0, 0.9, 12.0, 2.4],
+    ]
     beside = stroke(Level("0", 0.0, walls[:1]), RoutePlace(12.0, 1.0))
     assert beside.tolist() == [[12.0, 1.0, 12.0, 0.0], [12.0, 1.0, 12.0, 7.0]]
 
@@ -155,7 +156,7 @@ def test_ways_out_of_a_small_house_are_the_shortest() -> None:
 @pytest.mark.long
 @needs_data("maps/westport-house.json")
 def test_ways_out_of_a_real_building_are_the_shortest() -> None:
-    ratios = longer(load_plan(WESTPORT), 200)
+    ratios = longer(load_plan(DATA / "maps/westport-house.json"), 200)
     print(f"{len(ratios)} of 200 places: {np.quantile(ratios, [0.0, 0.5, 0.95, 1.0]).round(3)} of the shortest")
     assert len(ratios) > 100
     assert np.quantile(ratios, 0.95) < 1.03

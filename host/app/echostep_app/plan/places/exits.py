@@ -4,7 +4,7 @@
 In: a plan. Out: a `Pose` outside each exit, heading away from it. Owns the words by which sources name exits.
 
 On the ground: the doors that lead from an enclosed space into the open, or, on a level that lists none, the gaps that do. On any level: such a door
-whose name says that it is an exit or an entrance (OSM's `entrance` and texts of drawings become names of doors).
+whose name says that it is an exit or an entrance (IFC, IMDF; OSM's `entrance`).
 """
 
 from __future__ import annotations
