@@ -29,15 +29,17 @@ def shortest_walks(plan: Plan, places: Sequence[Pose]) -> tuple[Floats, Floats]:
     low, high = ends.min(0) - MARGIN_M, ends.max(0) + MARGIN_M
     x, y = (np.arange(low[axis], high[axis], CELL_M) + CELL_M / 2 for axis in (0, 1))
     points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
-    walls = [shapely.union_all(shapely.linestrings(level.solid.reshape(-1, 2, 2))) for level in plan.levels]
-    free = np.array([~shapely.contains(shapely.buffer(lines, BODY_M), points) for lines in walls])
+    lines = [shapely.union_all(shapely.linestrings(level.solid.reshape(-1, 2, 2))) for level in plan.levels]
+    walls, thin = (shapely.buffer(lines, by_m) for by_m in (BODY_M, NEAR_M))
+    shapely.prepare([*walls, *thin])
+    free = np.array([~shapely.contains(area, points) for area in walls])
     edge = [*range(3), *range(-3, 0)]  # over it nothing moves
     free[:, edge] = free[:, :, edge] = False
     index, edges = np.arange(free.size).reshape(free.shape), []
     for connector in plan.connectors:
         inside = shapely.contains(shapely.Polygon(connector.outline_m), points)
         for k in connector.levels:  # narrow stairs: close to their walls, but never over one in one move
-            free[k] |= inside & ~shapely.contains(shapely.buffer(walls[k], NEAR_M), points)
+            free[k] |= inside & ~shapely.contains(thin[k], points)
         for one, other in pairwise(connector.levels if connector.kind != "lift" else ()):
             rise_m = abs(plan.levels[one].height_m - plan.levels[other].height_m)
             edges.append((index[one][inside], index[other][inside], CLIMB * rise_m))

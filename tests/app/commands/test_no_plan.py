@@ -37,7 +37,7 @@ def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
     assert max(y) == pytest.approx(20.0, abs=0.5), "the first heading is up"
     assert math.hypot(x[-1], y[-1]) < 1.5
     cues = list(csv.DictReader((tmp_path / "first/cues.csv").read_text().splitlines()))
-    assert cues[int(np.argmax(y))]["text"] == "Turn around"
+    assert "Turn around" in {cue["text"] for cue in cues[: int(np.argmax(y))]}
     assert cues[-1]["kind"] == "arrived"
     assert (tmp_path / "first/track.png").stat().st_size > 5_000
     again = echostep(*replay, "--out", "second", cwd=tmp_path)
