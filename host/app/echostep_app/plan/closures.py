@@ -62,14 +62,11 @@ def stroke(level: Level, place: RoutePlace) -> Floats:
         return doors[[np.hypot(*to_door.T).argmin()]]
     to_wall = nearest_points(level.solid, at) - at
     length = np.hypot(*to_wall.T)
-    order = [k for k in np.argsort(length).tolist() if 0.0 < length[k] < REACH_M][:1]
-    ends = [at + to_wall[k] for k in order]
-    for k in order:
+    ends = [at + ALONE_M * np.array(step) for step in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    for k in [k for k in np.argsort(length).tolist() if 0.0 < length[k] < REACH_M][:1]:
         across = (to_wall @ to_wall[k] < OPPOSITE * length * length[k]) & (length < REACH_M)
-        ends += (
-            [at + to_wall[across][length[across].argmin()]] if across.any() else [at - REACH_M * to_wall[k] / length[k]]
-        )
-    ends = ends or [at + ALONE_M * np.array(step) for step in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+        other = to_wall[across][length[across].argmin()] if across.any() else -REACH_M * to_wall[k] / length[k]
+        ends = [at + to_wall[k], at + other]
     return np.array([[*at, *end] for end in ends]).reshape(-1, 4)
 
 
