@@ -206,11 +206,7 @@ BeaconsPort = Annotated[
 ]
 GuideTo = Annotated[
     str | None,
-    typer.Option(
-        "--guide",
-        metavar="TO",
-        help="Guide the wearer to a room, X,Y[,LEVEL], or the nearest exit.",
-    ),
+    typer.Option("--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], or exit: the nearest."),
 ]
 
 

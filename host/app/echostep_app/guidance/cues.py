@@ -34,6 +34,7 @@ class CueKind(StrEnum):
     AHEAD = "ahead"
 
 
+Finder = Callable[[RoutePlace], Route]
 Choice = tuple[CueKind, str, float | None]  # kind, words, direction from straight ahead (rad)
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
 NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
@@ -71,12 +72,7 @@ class Guide:
     With `again`, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
     """
 
-    def __init__(
-        self,
-        route: Route,
-        again: Callable[[RoutePlace], Route] | None = None,
-        arrived: str = "You have arrived",
-    ) -> None:
+    def __init__(self, route: Route, again: Finder | None = None, arrived: str = "You have arrived") -> None:
         """`again`: finds a route from a position off it. Raises EchostepError for a route without stretches."""
         if not route.stretches:
             raise EchostepError("a route needs at least one stretch")

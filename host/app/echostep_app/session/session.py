@@ -32,6 +32,7 @@ from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.mailbox import popped
 from echostep_app.plan.places.refusals import refusals
+from echostep_app.plan.routing import EXIT
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
 from echostep_app.printing.progress import progress_line
@@ -86,7 +87,7 @@ class Session:
         self.source = source
         self.recorded = recorded
         self.output = output
-        self.guided = guidance_of(tracker, guide_to)
+        self.guided, self._leaves = guidance_of(tracker, guide_to), guide_to == EXIT
         self.losses = Losses(tracker)
         self.arrivals = Arrivals()
         self.page: LivePage | None = None
@@ -136,6 +137,8 @@ class Session:
             keeps=self.source == "simulated",
         )
         print_page(console, page.server.urls)
+        if self._leaves and self.recorded is None:  # past what is struck out on a page
+            page.mailbox.set_goal(EXIT)
         page.fault_sources.append(FaultNews().words)
         self.page = opened.enter_context(page)
         self._sinks.append(page_sink(page))

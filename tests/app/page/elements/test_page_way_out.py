@@ -14,10 +14,11 @@ from echostep.plan import Door
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.elements.marks import BLOCKED, ShownMark, ShownOrder
-from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import EXIT
+from echostep_app.session.options import OutputOptions
+from echostep_app.session.session import Session
 from echostep_simulation.scenario import Scenario
 from page.browser import LOOKS, READY, loaded_page, picture, spot, wait_for
 from page.frames import LOCAL, PLAN, scene, told
@@ -87,16 +88,17 @@ def test_the_order_to_leave_shows_and_speaks_the_way_out(visit: tuple[Mailbox, A
     wait_for(page, "said.at(-1) === 'You are outside.'")
 
 
-def test_without_an_exit_the_way_out_is_the_way_back(scenario: Scenario, chunks: list[Chunk]) -> None:
-    tracker = Tracker(PLAN, scenario.start, seed=5)
-    with LivePage(tracker, "test", LOCAL) as live:
+def test_without_an_exit_a_run_to_it_goes_back(scenario: Scenario, chunks: list[Chunk], tmp_path: Path) -> None:
+    tracker, output = Tracker(PLAN, scenario.start, seed=5), OutputOptions(tmp_path, terminal=False, page=LOCAL)
+    with Session(tracker, "test", "live", output, EXIT) as session:
+        assert session.page
+        assert session.page.mailbox.goal == EXIT  # so that it avoids what is struck out on the page
         half = 2 * len(chunks) // 3
         for part in (chunks[:half], chunks[half:]):
             portion = portion_of(part)
             tracker.take(portion)
-            live.publish(portion)
-            shown = live.mailbox.latest.guidance if live.mailbox.latest else None
-            live.mailbox.set_goal(EXIT)
+            session.page.publish(portion)
+        shown = session.page.mailbox.latest.guidance if session.page.mailbox.latest else None
         assert shown
         assert shown.own
         assert shown.path[-1] == pytest.approx((2.0, 7.5), abs=0.1)
