@@ -21,6 +21,7 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
+WALK = ROOT / "tests/captures/walk.mcap"
 
 
 def foot_track() -> Track:

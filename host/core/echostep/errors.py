@@ -43,6 +43,7 @@ INSTEAD: dict[str, str] = {
     "calibrate --plan": LEARNT_BIAS,
     "calibrate rangers": LEARNT_BIAS,
     "[cloud] start_veer_sd_deg": "feet do not veer, and a robot's wheels are calibrated before its path is tracked",
+    "--guide wearer:": "Send NAME on the commander's page leads a rescuer there, and X,Y[,LEVEL] to a place",
     "evaluate gaits": "evaluate legs has its rows: --rows 'foot/*' and 'legs/*'",
     "evaluate lee2010": "evaluate legs has its rows: --rows 'lap/*', 'storeys*' and floors",
     "evaluate trails": "evaluate noplan has its rows: --rows 'trail/*'",

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,8 @@ from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import EXIT, RoutePlace
+from walks import DEMO
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_destinations_are_rooms_or_places() -> None:
     plan = demo()
     assert destination("office 2", plan) == RoutePlace(9.4, 12.2)
     assert destination("3,2", plan) == RoutePlace(3.0, 2.0)
-    assert destination("start", plan) == RoutePlace(2.0, 7.5)
+    assert destination("exit", plan) == EXIT
     for wrong in ("kitchen", "1,2,9", "nan,1", "1,2,3,4"):
         with pytest.raises(EchostepError, match="Office 1"):
             destination(wrong, plan)
@@ -76,17 +76,7 @@ def test_destinations_are_rooms_or_places() -> None:
 
 def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "truth.csv", walk.truth[:200], delimiter=",", header="t_s,x,y,heading_rad,z", comments="")
-    plan = Path(str(files("echostep") / "plans" / "demo.json"))
-    arguments = [
-        "beacons",
-        "simulate",
-        "--plan",
-        str(plan),
-        "--truth",
-        "truth.csv",
-        "--pace",
-        "100",
-    ]
+    arguments = ["beacons", "simulate", "--plan", str(DEMO), "--truth", "truth.csv", "--pace", "100"]
     run = echostep(*arguments, "--to", "udp://127.0.0.1:9", cwd=tmp_path, ends=0)
     assert "bytes sent" in run.stdout
     run = echostep(*arguments, "--to", "/dev/nowhere", cwd=tmp_path, ends=2)

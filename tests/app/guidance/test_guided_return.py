@@ -20,7 +20,7 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
-from echostep_app.guidance.guided_return import AGAIN, IN, TURN_M, GuidedReturn
+from echostep_app.guidance.guided_return import GuidedReturn
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.guidance.own_way import JOIN_M, STEP_M, OwnWay
 
@@ -37,57 +37,46 @@ def along(corners: Floats, step_m: float = 0.4) -> Floats:
     return np.concatenate([*pieces, corners[-1:]])
 
 
-def guided(places: Floats, sd_m: float = 0.1, status: TrackStatus = TrackStatus.TRACKING) -> list[Cue]:
-    """The cues at these positions, one a second, the heading along the way."""
+def guided(
+    way_in: Floats, way_back: Floats, sd_m: float = 0.1, status: TrackStatus = TrackStatus.TRACKING
+) -> list[Cue]:
+    """The cues at the positions of the way back, one a second, the heading along the way."""
     tracker = SimpleNamespace(watchers=[], state=SimpleNamespace(beacon_heard_s=None))
-    run = GuidedReturn(cast("Tracker", tracker))
+    run, places = GuidedReturn(cast("Tracker", tracker), is_wanted=False), np.concatenate([way_in, way_back])
     headings = np.arctan2(*np.diff(places, axis=0, append=places[-1:]).T[::-1])
     for k, ((x, y), heading) in enumerate(zip(places.tolist(), headings.tolist(), strict=True)):
-        e = Estimate(float(k), x, y, sd_m**2, 0.0, sd_m**2, heading, 0.05, k, status)
-        run._watch(MEASURED, e)
+        run.is_wanted = k >= len(way_in)
+        run._watch(MEASURED, Estimate(float(k), x, y, sd_m**2, 0.0, sd_m**2, heading, 0.05, k, status))
+        assert run.is_wanted or not run.cues
     return run.cues
 
 
-def test_nothing_is_said_on_the_way_in() -> None:
-    cues = guided(along(CORNERS))
-    assert not any(cue.spoken for cue in cues)
-    assert cues[-10].arrow_rad == pytest.approx(-math.pi, abs=0.1) or cues[-10].arrow_rad == pytest.approx(
-        math.pi, abs=0.1
-    )
-    assert cues[-1].left_m == pytest.approx(50.0, abs=1.0)
-
-
 @pytest.mark.parametrize("drift_m", [0.0, 1.5])
-def test_the_way_back_is_told_from_the_turn_to_the_start(drift_m: float) -> None:
+def test_the_way_back_is_told_from_when_it_is_wanted_to_the_start(drift_m: float) -> None:
     """The way back is seen beside the way in: the track has drifted."""
     way_in, way_back = along(CORNERS), along(CORNERS[::-1])
     way_back[:, 0] += np.linspace(0.0, drift_m, len(way_back))
-    cues = guided(np.concatenate([way_in, way_back]), sd_m=0.1 + 0.3 * drift_m)
-    back = cues[len(way_in) :]
-    begun = next(k for k, cue in enumerate(back) if cue.spoken or cue.text != IN)
-    assert 0.4 * begun < TURN_M + 2.0
+    back = guided(way_in, way_back, sd_m=0.1 + 0.3 * drift_m)
+    assert back[0].spoken
+    assert back[0].left_m == pytest.approx(50.0, abs=1.0)
     assert any(cue.kind is CueKind.TURN for cue in back)
     arrived = next(k for k, cue in enumerate(back) if cue.kind is CueKind.ARRIVED)
-    assert all(abs(cue.arrow_rad or 0.0) < math.radians(100.0) for cue in back[begun:arrived])
-    left_m = np.array([cue.left_m for cue in back[begun:arrived]])
-    assert (np.diff(left_m) < 0.5).all()
+    assert all(abs(cue.arrow_rad or 0.0) < math.radians(100.0) for cue in back[5:arrived])
+    assert (np.diff([cue.left_m for cue in back[:arrived]]) < 0.5).all()
     assert len(back) - arrived < 6
 
 
 def test_a_long_way_leads_back_although_its_drift_is_great() -> None:
     """Ten metres of standard deviation since the start: the position is lost, the way back is not."""
-    cues = guided(np.concatenate([along(CORNERS), along(CORNERS[::-1])]), sd_m=10.0, status=TrackStatus.LOST)
+    cues = guided(along(CORNERS), along(CORNERS[::-1]), sd_m=10.0, status=TrackStatus.LOST)
     assert any(cue.kind is CueKind.TURN for cue in cues)
     assert any(cue.kind is CueKind.ARRIVED for cue in cues)
 
 
-def test_going_in_again_ends_the_return() -> None:
-    half = along(np.array([CORNERS[-1], CORNERS[-2], (10.0, 20.0)]))
-    again = along(np.array([(10.0, 20.0), (10.0, 40.0)]))
-    cues = guided(np.concatenate([along(CORNERS), half, again]))
-    assert [cue.spoken for cue in cues].count(f"{AGAIN}.") == 1
-    assert not any(cue.spoken for cue in cues[-10:])
-    assert cues[-1].left_m == pytest.approx(50.0, abs=2.0)
+def test_who_goes_on_in_is_told_to_come_back() -> None:
+    cues = guided(along(CORNERS), along(np.array([CORNERS[-1], (15.0, 55.0)])))
+    assert {cue.kind for cue in cues[20:]} <= {CueKind.TURN, CueKind.OFF}
+    assert cues[-1].left_m == pytest.approx(70.0, abs=3.0)
 
 
 def test_a_loop_is_cut_where_it_closes() -> None:
@@ -126,10 +115,10 @@ def test_the_way_back_is_the_shortest_through_the_positions(moves: list[tuple[fl
     assert np.hypot(*np.diff(line, axis=0).T).sum() == pytest.approx(back[-1])
 
 
-def test_without_a_plan_the_start_is_the_only_destination() -> None:
+def test_without_a_plan_the_way_out_is_the_way_back() -> None:
     tracker: Any = Tracker(NO_PLAN)
-    assert isinstance(guidance_of(tracker, "start"), GuidedReturn)
-    with pytest.raises(EchostepError, match="--guide Kitchen: without a plan the only destination is: start"):
+    assert isinstance(guidance_of(tracker, "exit"), GuidedReturn)
+    with pytest.raises(EchostepError, match="--guide Kitchen: without a plan the only destination is: exit"):
         guidance_of(tracker, "Kitchen")
 
 

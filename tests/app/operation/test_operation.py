@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from echostep_app.operation import trails
 from echostep_app.operation.operation import MOST_EVENTS
 from echostep_app.operation.words import tilt_words
+from echostep_app.team.messages.marks import Mark
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, Team, place, whole_team
+from page.elements.test_page_way_out import HOUSE
+from waiting import until
 
 
 def columns(raw: bytes, width: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
@@ -56,6 +61,23 @@ def test_places_are_those_of_the_reports() -> None:
     assert np.isnan(rows[numbers["Kim"]][3])
     assert np.isnan(rows[numbers["Kim"]][5])
     assert numbers["Bo"] not in rows
+
+
+def test_how_far_the_exit_is_from_each_wearer() -> None:
+    plan = replace(HOUSE, digest="7" * 64)
+    team = Team(plan)
+    for floor, name in enumerate(("Kim", "Bo")):
+        team.hear(name, place(plan, 12.0, 5.0, floor))
+    team.hear("Eve", None)
+
+    def says(length: str, name: str) -> bool:
+        team.pass_time(1.0)
+        return any(f"{length} m to the exit" in row.words for row in team.scene().rows if row.name == name)
+
+    assert until(lambda: says(" 9", "Kim") and says("", "Bo"))  # the grids are laid in a thread
+    assert not says("", "Eve")
+    team.put_bytes(*Mark(1, "0123abcd", "blocked", 20.0, 5.0, 0, "Ann", team.unix_s, plan.digest).message)
+    assert until(lambda: says(" 10", "Kim"))  # by the other door
 
 
 def test_a_wearer_on_another_plan_has_no_place_on_this_one_and_it_is_said() -> None:

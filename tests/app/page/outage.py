@@ -23,7 +23,7 @@ from typing import Self
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.web import users
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import Goal
 from operation.teams import ServedTeam, Team, whole_team
 from page.frames import PLAN, scene, served
 from waiting import PATIENCE_S
@@ -37,7 +37,7 @@ def serve_wearer() -> None:
     users.has_other_users = lambda: False  # else there would be a token in the address
     with served(Mailbox(PLAN, "echostep live", replay=False)) as (server, mailbox):
         print(server.url, flush=True)
-        goal: RoutePlace | None = None
+        goal: Goal | None = None
         for k in count():
             mailbox.publish(replace(scene(1.0 + PAUSE_S * k), status_text="tracking, 0.2 m", guidance=WAY))
             mailbox.exchange.note_alive()

@@ -14,8 +14,7 @@ import socket
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,8 @@ from echostep_app.commands.actions.beacon_player import simulate_gateway
 from echostep_simulation.devices.board import PythonBoard, Sent
 from echostep_simulation.scenario import Scenario
 from free_ports import free_port
-from page.frames import header, opened_url
+from page.elements.test_page_guide import until
+from page.frames import opened_url
 from players import pseudo_terminal
 from walks import walk_chunks
 
@@ -111,17 +111,6 @@ def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
             running.communicate()
 
 
-def frames(url: str) -> Generator[dict[str, Any], None, None]:
-    """What a page gets that draws at once."""
-    ends = time.monotonic() + PATIENCE_S
-    with opened_url(url) as page:
-        assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
-        while time.monotonic() < ends:
-            frame = header(page.recv(timeout=PATIENCE_S))
-            page.send(json.dumps({"kind": "drawn", "seq": frame["seq"]}))
-            yield frame
-
-
 @pytest.mark.long
 @pytest.mark.process
 def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[str], tmp_path: Path) -> None:
@@ -129,19 +118,19 @@ def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[
     url = next(found[1] for line in live.stdout if (found := re.search(r"The page: (\S+)", line)))
     spoken: set[str] = set()
     marks: dict[int, dict[str, Any]] = {}
-    seen: dict[str, Any] = {}
-    with contextlib.closing(frames(url)) as pages:
-        try:
-            seen = next(pages)
-        except (OSError, InvalidMessage) as error:
-            assert live.poll() is None, live.stdout.read()
-            pytest.skip(f"this machine is too slow to walk in real time: no page yet ({error})")
-    for seen in frames(url):
-        marks |= {mark["number"]: mark for mark in seen["beacons"]}
-        spoken |= {seen["guidance"]["spoken"]} if seen["guidance"] else set()
-        if "You have arrived." in spoken:
-            break
-    assert seen
+
+    def has_arrived(frame: dict[str, Any]) -> bool:
+        marks.update({mark["number"]: mark for mark in frame["beacons"]})
+        spoken.update([frame["guidance"]["spoken"]] if frame["guidance"] else [])
+        return "You have arrived." in spoken
+
+    try:
+        with opened_url(url) as page:
+            assert json.loads(page.recv(timeout=PATIENCE_S))["kind"] == "hello"
+            seen = until(page, has_arrived)
+    except (OSError, InvalidMessage) as error:
+        assert live.poll() is None, live.stdout.read()
+        pytest.skip(f"this machine is too slow to walk in real time: no page ({error})")
     live.send_signal(signal.SIGINT)
     said, _ = live.communicate(timeout=PATIENCE_S)
     assert live.returncode == 0, said

@@ -239,9 +239,7 @@ def ink_near(page: Any, x_m: float, y_m: float) -> bool:
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
     mailbox = Mailbox(PLAN, "test", replay=False)
-    told = [
-        guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0, 0.5), None, 0, None) for t, text in SENTENCES
-    ]
+    told = [guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0), None, 0, None) for t, text in SENTENCES]
     with PageServer(mailbox, LOCAL) as server, opened_page(browser, **LOOKS["bright"]) as page:
         page.add_init_script(SPEECH)
         page.goto(server.url)
@@ -275,7 +273,7 @@ def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(b
     mailbox = Mailbox(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
     with PageServer(mailbox, LOCAL) as server:
-        shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 2.0, "", 9.0, 3.0), None, 0, None))
+        shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 3.0, "", 9.0), None, 0, None))
         mailbox.publish(replace(scene(), guidance=shown))
         page = looking(browser, server.url, "bright")
         wait_for(page, f"{turn} === 'rotate(-3rad)'")

@@ -55,6 +55,7 @@ def test_what_becomes_of_a_house(tmp_path: Path) -> None:
     assert len(ground.walls) == 7
     assert sorted(door.width_m for door in ground.doors) == [pytest.approx(0.9, abs=0.01), pytest.approx(1.2, abs=0.01)]
     assert len(upper.doors) == 1
+    assert ([door.name for door in ground.doors if door.name], len(plan.exits)) == (["main entrance"], 1)
     assert {(c.kind, c.levels) for c in plan.connectors} == {("stairs", (0, 1)), ("lift", (0, 1))}
     stairs = next(c for c in plan.connectors if c.kind == "stairs")
     assert np.ptp(stairs.outline_m, axis=0) == pytest.approx([2, 2], abs=0.02)

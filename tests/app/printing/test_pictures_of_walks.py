@@ -11,13 +11,10 @@ from typing import Any
 import pytest
 
 import echostep
-from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep_app.printing.picture_files import ENDINGS
-from walks import DEMO, foot_track
-
-WALK = ROOT / "tests/captures/walk.mcap"
+from walks import DEMO, WALK, foot_track
 
 
 @pytest.fixture(scope="module")

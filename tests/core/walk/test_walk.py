@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 
 import echostep
-from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep.walk.table import write_track
-from walks import DEMO, foot_track
+from walks import DEMO, WALK, foot_track
 
 pytestmark = pytest.mark.slow
-WALK = ROOT / "tests/captures/walk.mcap"
 
 
 @pytest.fixture(scope="module")

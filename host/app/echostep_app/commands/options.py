@@ -206,9 +206,7 @@ BeaconsPort = Annotated[
 ]
 GuideTo = Annotated[
     str | None,
-    typer.Option(
-        "--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], start, or wearer:NAME of the team."
-    ),
+    typer.Option("--guide", metavar="TO", help="Guide the wearer to a room, X,Y[,LEVEL], or exit: the nearest."),
 ]
 
 

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Cues for a wearer on a route: where to go next, as words, as an arrow, and as a sentence to speak.
 
-In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, the arrow's present direction, and the
-`Contact`: the last known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
+In: a `Route`, estimates, and when a beacon was last received. Out: `Cue`s. Owns the progress along the route, and the `Contact`: the last
+known place, and when to go back to it. With an uncertain heading there is no direction: the cue is then "stop".
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 
@@ -34,13 +34,20 @@ class CueKind(StrEnum):
     AHEAD = "ahead"
 
 
+Finder = Callable[[RoutePlace], Route]
 Choice = tuple[CueKind, str, float | None]  # kind, words, direction from straight ahead (rad)
 NO_HEADING = "Stop. Your direction is not known: turn once around, slowly"
 NEVER_KNOWN = "Your place is not known yet: walk slowly along the walls"
-# Direction beyond which the target is behind, assumed.
-AROUND_RAD = math.radians(135.0)
-RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place, assumed
-LONGEST_SPAN_S = 5.0  # between two estimates; after a longer one the arrow starts again, assumed
+AHEAD_M = 3.0  # of the arrow's target along the route [Fischer 2008, 4.2]
+# Assumed:
+ARRIVED_M = 1.0  # from the end: the wearer has arrived
+OFF_M = 2.0  # distance from the route, beyond the 95 % radius, that is off it: the width of a corridor
+SILENCE_S = 3.0  # without beacon contact before the wearer is sent back
+HEADING_SD_RAD = math.radians(45.0)  # greatest standard deviation of a usable heading
+TURN_RAD = math.radians(30.0)  # least angle of a cue to turn
+AROUND_RAD = math.radians(135.0)  # direction beyond which the target is behind
+SAY_AGAIN_S = 8.0  # least time before a sentence is repeated
+RETURN_AHEAD_M = 1.0  # target of the arrow back to the route, along the route from the nearest place
 ARROWS = "↑↖←↙↓↘→↗"
 
 
@@ -48,8 +55,7 @@ ARROWS = "↑↖←↙↓↘→↗"
 class Cue:
     """One cue. `arrow_rad`: direction to walk relative to the wearer's heading, counter-clockwise; None: no arrow is shown.
 
-    `spoken` is empty when there is nothing new to say. `left_m`: length of the route ahead. `aim_rad`: direction towards which the arrow is turning,
-    for a view that draws it more often than estimates come.
+    `spoken` is empty when there is nothing new to say. `left_m`: length of the route ahead.
     """
 
     t_s: float
@@ -58,59 +64,28 @@ class Cue:
     arrow_rad: float | None
     spoken: str = ""
     left_m: float = math.nan
-    aim_rad: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class GuidanceSettings:
-    """Limits of guidance.
-
-    `ahead_m`: the target's distance along the route [Fischer 2008, 4.2]. `arrived_m`: distance from the end at which the wearer has arrived.
-    `off_m`: distance from the route, beyond the 95 % radius, that counts as off it. `silence_s`: time without beacon contact before the wearer is
-    sent back. `heading_sd_deg`: greatest standard deviation of a usable heading. `turn_deg`: least angle of a cue to turn. `arrow_s`: time constant
-    of the arrow, `arrow_deg_s` its greatest rate. `say_again_s`: least time before a sentence is repeated.
-    """
-
-    ahead_m: float = 3.0
-    arrived_m: float = 1.0
-    off_m: float = 2.0
-    silence_s: float = 3.0
-    heading_sd_deg: float = 45.0
-    turn_deg: float = 30.0
-    arrow_s: float = 0.5
-    arrow_deg_s: float = 180.0
-    say_again_s: float = 8.0
-
-
-class _Planner(Protocol):
-    """Finds a route between two places."""
-
-    def way(self, start: RoutePlace, end: RoutePlace) -> Route: ...
 
 
 class Guide:
     """Guides one wearer along one route.
 
-    With a planner, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
+    With `again`, a wearer off the route gets a new one from the present place; without, the arrow leads back to the route.
     """
 
-    def __init__(self, route: Route, settings: GuidanceSettings | None = None, planner: _Planner | None = None) -> None:
-        """Raises EchostepError for a route without stretches."""
+    def __init__(self, route: Route, again: Finder | None = None, arrived: str = "You have arrived") -> None:
+        """`again`: finds a route from a position off it. Raises EchostepError for a route without stretches."""
         if not route.stretches:
             raise EchostepError("a route needs at least one stretch")
         self.route = route
-        self._settings = settings or GuidanceSettings()
-        self._planner = planner
+        self.arrived = arrived
+        self._again = again
         self._stretch = 0
         self._progress_m = 0.0
-        self._arrow: float | None = None
-        self._arrow_s = -math.inf
         self._contact = np.zeros(1, CONTACT)[0]
         self._was_lost = False
         self._known_level: int | None = None  # of the last known place; None before the first
         self._last_text = ""
         self._spoken_s = -math.inf
-        self.replanned = 0
 
     def cue(self, e: Estimate, heard_s: float | None = None) -> Cue:
         """The cue at this estimate; `heard_s`: when a beacon last measured, None without beacons."""
@@ -120,13 +95,13 @@ class Guide:
         """What to do at this estimate. A reached end counts, whether beacons measure there or not."""
         lost = not e.claims_place
         back, silent = self._update_contact(e, heard_s, lost)
-        if e.heading_sd_rad > math.radians(self._settings.heading_sd_deg):
+        if e.heading_sd_rad > HEADING_SD_RAD:
             return CueKind.STOP, NO_HEADING, None
         if self._known_level is None:
             return CueKind.STOP, NEVER_KNOWN, None
         self._update_progress(e)
         if not lost and self._has_arrived(e):
-            return CueKind.ARRIVED, "You have arrived", None
+            return CueKind.ARRIVED, self.arrived, None
         why = "Your place is not known" if lost else "No beacon hears you"
         if back and self._known_level == e.level:
             x, y = self._contact["known_x"], self._contact["known_y"]
@@ -139,15 +114,15 @@ class Guide:
 
     def _update_contact(self, e: Estimate, heard_s: float | None, lost: bool) -> tuple[bool, bool]:
         """Update the contact; whether the wearer is to go back, and whether no beacon measures. An estimate that is not lost any more is known."""
-        contact, silence_s = self._contact, self._settings.silence_s
+        contact = self._contact
         known_s = e.t_s if heard_s is None or self._was_lost else heard_s
         if not lost and self._known_level is None:
             start_contact(contact, known_s, e.x_m, e.y_m)
         if not lost and (self._known_level is None or known_s > contact["known_s"]):
             self._known_level = e.level
         self._was_lost = lost
-        back = update_contact(contact, e.t_s, known_s, e.x_m, e.y_m, lost, silence_s)
-        return back, bool(e.t_s - contact["known_s"] > allowed_silence(contact, silence_s))
+        back = update_contact(contact, e.t_s, known_s, e.x_m, e.y_m, lost, SILENCE_S)
+        return back, bool(e.t_s - contact["known_s"] > allowed_silence(contact, SILENCE_S))
 
     @property
     def left_m(self) -> float:
@@ -171,30 +146,30 @@ class Guide:
             if later:
                 self._stretch = min(later, key=lambda k: (k < self._stretch, abs(k - self._stretch)))
                 self._progress_m = 0.0
-        reach = 2.0 * self._settings.ahead_m
+        reach = 2.0 * AHEAD_M
         progress, off = nearest(self._here.line_m, e.x_m, e.y_m, self._progress_m - reach, self._progress_m + reach)
-        if off > self._settings.off_m:
+        if off > OFF_M:
             progress, off = nearest(self._here.line_m, e.x_m, e.y_m, 0.0, math.inf)
         self._progress_m = progress
 
     def _choose_along(self, e: Estimate) -> Choice:
         """What to do on the route: arrived, change of level, turn, or straight ahead."""
-        s, line = self._settings, self._here.line_m
+        line = self._here.line_m
         off_m = self._off_m(e)
-        if off_m > s.off_m + e.ellipse95.major_m:
+        if off_m > OFF_M + e.ellipse95.major_m:
             return self._choose_off_route(e, off_m)
         if self._has_arrived(e):
-            return CueKind.ARRIVED, "You have arrived", None
-        arrow = turn_ahead(line, self._progress_m + s.ahead_m, e.x_m, e.y_m, e.heading_rad)
+            return CueKind.ARRIVED, self.arrived, None
+        arrow = turn_ahead(line, self._progress_m + AHEAD_M, e.x_m, e.y_m, e.heading_rad)
         rest = way_m(line) - self._progress_m
-        if not self._last and rest < s.ahead_m:
+        if not self._last and rest < AHEAD_M:
             after = self.route.stretches[self._stretch + 1].level
             step = "up" if after > e.level else "down"
             return CueKind.CHANGE, f"Take the {self._here.by} {step}", arrow
         side = wrap(arrow)
         if abs(side) > AROUND_RAD:
             return CueKind.TURN, "Turn around", arrow
-        if abs(side) > math.radians(s.turn_deg):
+        if abs(side) > TURN_RAD:
             return CueKind.TURN, "Turn left" if side > 0.0 else "Turn right", arrow
         return CueKind.AHEAD, "Straight ahead", arrow
 
@@ -205,10 +180,10 @@ class Guide:
 
     def _has_arrived(self, e: Estimate) -> bool:
         """Whether the end of the route is reached."""
-        s, end = self._settings, self._here.line_m[-1]
-        if self._off_m(e) > s.off_m + e.ellipse95.major_m:
+        end = self._here.line_m[-1]
+        if self._off_m(e) > OFF_M + e.ellipse95.major_m:
             return False
-        return self.left_m < s.arrived_m or (self._last and math.hypot(e.x_m - end[0], e.y_m - end[1]) < s.arrived_m)
+        return self.left_m < ARRIVED_M or (self._last and math.hypot(e.x_m - end[0], e.y_m - end[1]) < ARRIVED_M)
 
     @property
     def _last(self) -> bool:
@@ -216,17 +191,14 @@ class Guide:
         return self._stretch == len(self.route.stretches) - 1
 
     def _choose_off_route(self, e: Estimate, off_m: float) -> Choice:
-        """The cue off the route: a new route with a planner, else the direction back to the route."""
-        if self._planner is not None:
-            end = self.route.stretches[-1]
-            goal = RoutePlace(float(end.line_m[-1, 0]), float(end.line_m[-1, 1]), end.level)
+        """The cue off the route: another route where one is looked for, else the direction back to the route."""
+        if self._again is not None:
             try:
-                self.route = self._planner.way(RoutePlace(e.x_m, e.y_m, e.level), goal)
+                self.route = self._again(RoutePlace(e.x_m, e.y_m, e.level))
             except EchostepError:
                 return CueKind.STOP, "Stop. No way leads on from here", None
             self._stretch, self._progress_m = 0, 0.0
-            self.replanned += 1
-            arrow = turn_ahead(self._here.line_m, self._settings.ahead_m, e.x_m, e.y_m, e.heading_rad)
+            arrow = turn_ahead(self._here.line_m, AHEAD_M, e.x_m, e.y_m, e.heading_rad)
             return CueKind.OFF, "You left the way. Here is another", arrow
         if self._here.level != e.level:
             return CueKind.STOP, "Stop. You are on the wrong level", None
@@ -234,31 +206,13 @@ class Guide:
         return CueKind.OFF, f"You left the way: it is {off_m:.0f} metres off", arrow
 
     def _make_cue(self, e: Estimate, kind: CueKind, text: str, arrow_rad: float | None) -> Cue:
-        """A cue with its smoothed arrow, and its sentence unless that was just spoken."""
-        arrow = self._smooth(arrow_rad, e.t_s)
-        new = text != self._last_text or e.t_s - self._spoken_s >= self._settings.say_again_s
+        """A cue, with its sentence unless that was just spoken."""
+        new = text != self._last_text or e.t_s - self._spoken_s >= SAY_AGAIN_S
         spoken = ""
         if new and not (kind is CueKind.AHEAD and text == self._last_text):
             spoken, self._last_text, self._spoken_s = text + ".", text, e.t_s
-        aim = None if arrow_rad is None else wrap(arrow_rad)
-        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m, aim)
-
-    def _smooth(self, wanted: float | None, t_s: float) -> float | None:
-        """The arrow's new direction: it follows with a time constant and a greatest rate; after it was hidden it starts at `wanted`."""
-        s = self._settings
-        if wanted is None:
-            self._arrow = None
-            return None
-        span_s = t_s - self._arrow_s
-        self._arrow_s = t_s
-        if self._arrow is None or not 0.0 <= span_s < LONGEST_SPAN_S:
-            self._arrow = wrap(wanted)
-            return self._arrow
-        off = wrap(wanted - self._arrow)
-        turn = off * (1.0 - math.exp(-span_s / s.arrow_s))
-        most = math.radians(s.arrow_deg_s) * span_s
-        self._arrow = wrap(self._arrow + min(max(turn, -most), most))
-        return self._arrow
+        arrow = None if arrow_rad is None else wrap(arrow_rad)
+        return Cue(e.t_s, kind, text, arrow, spoken, self.left_m)
 
 
 def arrow_sign(arrow_rad: float | None) -> str:

@@ -35,7 +35,9 @@ from echostep_app.operation.words import (
     shown_wearer,
     summary_words,
 )
-from echostep_app.page.elements.marks import ShownMark
+from echostep_app.page.elements.marks import ShownMark, closed_places
+from echostep_app.plan.closures import OpenWays
+from echostep_app.plan.routing import RoutePlace
 from echostep_app.team.commander import rejected
 from echostep_app.team.inbox import ReceivedMessage
 from echostep_app.team.messages.crews import Crew
@@ -79,6 +81,7 @@ class _Followed:
 
     number: int
     state: MemberState | None = None
+    exit: tuple[object, float | None] = (None, None)  # where, and past what, and the length of the way out
     history: deque[ShownEvent] = field(default_factory=lambda: deque(maxlen=MOST_EVENTS))
 
 
@@ -93,6 +96,7 @@ class Operation:
         self._board = MarkBoard()
         self._shared: Shared = ((), (), ())
         self._trails = Trails()
+        self._ways = OpenWays(plan)
         self._followed: dict[Key, _Followed] = {}
         self._next_number = 1
         self._lock = threading.Lock()
@@ -107,7 +111,7 @@ class Operation:
         with self._lock:
             made.roster, made._board, made._trails = self.roster.copy(), self._board.copy(), self._trails.copy()
             made._followed = {key: replace(f, history=f.history.copy()) for key, f in self._followed.items()}
-            made._next_number = self._next_number
+            made._next_number, made._ways = self._next_number, self._ways
         return made
 
     def receive(
@@ -290,14 +294,27 @@ class Operation:
     def _list(self, members: list[Member], now_s: float, unix_s: float) -> None:
         """Make the list anew; marks on this plan, crews and notes stay the same objects while they are the same."""
         duplicates = self.roster.duplicates(now_s)
-        self._rows = tuple(
-            shown_wearer(self._followed[m.key].number, m, self.plan, now_s, duplicates, self._board)
-            for m in members
-            if m.key in self._followed
-        )
         shared = shown_shared(self._board, self.plan, unix_s)
         self._shared = self._shared if shared == self._shared else shared
+        self._rows = tuple(
+            shown_wearer(
+                followed.number, m, self.plan, now_s, duplicates, self._board, self._exit_m(followed, m, now_s)
+            )
+            for m in members
+            if (followed := self._followed.get(m.key))
+        )
         self._listed_s, self._changed = now_s, False
+
+    def _exit_m(self, followed: _Followed, m: Member, now_s: float) -> float | None:
+        """How far the exit is; looked for again when the wearer has moved."""
+        p, level = m.at(now_s).last_known, level_on(self.plan, m)
+        if p is None or level is None:
+            return None
+        routes = self._ways.past(closed_places(self._shared[0]))
+        asked = routes, round(p.x_m), round(p.y_m), level
+        if followed.exit[0] != asked or followed.exit[1] is None:
+            followed.exit = asked, routes.exit_m(RoutePlace(p.x_m, p.y_m, level))
+        return followed.exit[1]
 
     def _places(self, members: list[Member], now_s: float) -> bytes:
         rows = array("f")

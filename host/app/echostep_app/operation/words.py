@@ -110,11 +110,12 @@ def shown_shared(board: MarkBoard, plan: Plan, unix_s: float) -> Shared:
 
 
 def shown_wearer(
-    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard
-) -> ShownWearer:
-    """The row of a member: "2nd floor, near stairs B, within 0.4 m, heard 2 s ago"."""
-    state = m.state(now_s)
-    parts = [STATES[state], *where_words(m, now_s), heard_words(m.silent_s(now_s))]
+    number: int, m: Member, plan: Plan, now_s: float, duplicates: set[tuple[str, str]], board: MarkBoard,
+    exit_m: float | None = None,
+) -> ShownWearer:  # fmt: skip
+    """The row of a member: "2nd floor, near stairs B, within 0.4 m, 23 m to the exit, heard 2 s ago"."""
+    state, out = m.state(now_s), "" if exit_m is None else f"{exit_m:.0f} m to the exit"
+    parts = [STATES[state], *where_words(m, now_s), out, heard_words(m.silent_s(now_s))]
     words = ", ".join(filter(None, parts))
     remarks, key = notes(m, plan, now_s, duplicates), alarm_key(m)
     ack = board.acks.get(key) if key else None

@@ -21,6 +21,7 @@ from echostep.path import MeasuredSegment
 from echostep.ports.chunks import BOARD, FOOT, MTX, Portion
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
+from echostep_app.guidance.guided_return import GuidedReturn
 from echostep_app.page.drawing_process import DrawingProcess
 from echostep_app.page.elements.alarm import shown_alarm
 from echostep_app.page.elements.echo_lines import EchoLine, expected_range, last_echo_lines
@@ -34,7 +35,7 @@ from echostep_app.page.elements.undo_offer import UndoClock, echoes_fit
 from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.server import Address, PageServer
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import EXIT, RoutePlace
 from echostep_app.ports.arrival_clock import now_ns
 from echostep_app.wearer.alarm import watch_of
 from echostep_app.wearer.steady_status import SETTLED_S, SteadyStatus, running_note, span_words
@@ -98,6 +99,8 @@ class LivePage:
         self._trail_breaks = False  # before its next point
         self._check_ins = (0, 0)  # check-ins and undoings
         self._undo_clock, self._numbers, self._steady = UndoClock(), PlaceNumbers(), SteadyStatus()
+        self.mailbox.goes_back = not (replay or (tracker.plan.is_drawn and tracker.plan.exits))
+        self._back = GuidedReturn(tracker, is_wanted=False) if self.mailbox.goes_back else None
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self.mailbox.publish(self._scene)
@@ -312,6 +315,11 @@ class LivePage:
         return tuple(sorted((line for line in lines if estimate.t_s - line.t_s < SHOWN_S), key=attrgetter("ranger")))
 
     def _guidance(self, estimate: Estimate) -> ShownGuidance | None:
-        if self._guided and self._guided.cue:
-            return guidance_of_cue(self._guided.cue, self._guided.route, estimate.level, self._scene.guidance)
-        return self._scene.guidance
+        guided = self._guided
+        if self._back:
+            self._back.is_wanted = self.mailbox.goal == EXIT
+            guided = self._back if self._back.is_wanted else guided
+        if guided is None or guided.cue is None:
+            return None
+        shown = guidance_of_cue(guided.cue, guided.route, estimate.level, self._scene.guidance)
+        return replace(shown, own=guided is not self._guided)

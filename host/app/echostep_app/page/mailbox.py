@@ -7,6 +7,7 @@ and the check-ins for the tracker. Owns these.
 
 from __future__ import annotations
 
+import math
 import queue
 from array import array
 from bisect import bisect_right
@@ -17,14 +18,17 @@ from typing import TypeVar
 from echostep.plan import Plan
 from echostep.ports.people.check_in import Call, CheckIn, Undo
 from echostep_app.page.elements.drawn_walls import ShownDrawing
-from echostep_app.page.elements.marks import ShownMark, ShownOrder
+from echostep_app.page.elements.marks import BLOCKED, ShownMark, ShownOrder, closed_places
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.web.exchange import Exchange
 from echostep_app.plan.places.bearing import north_rad
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import EXIT, Goal, RoutePlace
 
 MOST_CHECK_INS = 16  # in the queue to the tracker; further ones are refused: a person makes a few in a minute
+
+MOST_STRUCK = 32  # passages
+SAME_M = 1.5  # from a passage that is struck out: a tap there means it
 
 T = TypeVar("T")
 
@@ -95,9 +99,11 @@ class Mailbox:
         self.failure = ""  # the error that ends the run, in words
         self._keeps = keeps
         self.latest: PageScene | None = None
-        self.goal: RoutePlace | None = None
+        self.goal: Goal | None = None
+        self.goes_back = False  # without an exit the run itself guides to it: back along the own way
         self.errand = ""  # who sent the wearer to the destination, in words
-        self.marks: tuple[ShownMark, ...] = ()  # of the commanders; replaced, never changed
+        self.marks: tuple[ShownMark, ...] = ()  # of the commanders, and of this run's pages; replaced, never changed
+        self._struck: tuple[ShownMark, ...] = ()  # those of the pages: no way
         self._drawings: tuple[
             ShownDrawing, ...
         ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
@@ -117,19 +123,34 @@ class Mailbox:
         self.latest = scene
         self._announce()
 
-    def set_goal(self, goal: RoutePlace | None, errand: str = "") -> None:
+    def set_goal(self, goal: Goal | None, errand: str = "") -> None:
         """Set the destination of all pages and call `on_publish`; None ends the guidance to it. `errand`: who sent the wearer there, in words."""
         self.goal, self.errand = goal, errand
         self._announce()
 
     def set_marks(self, marks: tuple[ShownMark, ...]) -> None:
         """Replace the commanders' marks and call `on_publish`."""
-        self.marks = marks
+        self.marks = (*marks, *self._struck)
         self._announce()
 
+    @property
+    def closed(self) -> tuple[RoutePlace, ...]:
+        """The places at which there is no way."""
+        return closed_places(self.marks)
+
+    def strike(self, place: RoutePlace) -> None:
+        """Mark that there is no way at a place; where that is marked by this run, remove the mark."""
+        others, at = [mark for mark in self.marks if mark not in self._struck], (place.x_m, place.y_m)
+        kept = [m for m in self._struck if m.level != place.level or math.dist((m.x_m, m.y_m), at) > SAME_M]
+        new = ShownMark(f"{BLOCKED} {at}", BLOCKED, *at, place.level, "")
+        self._struck = tuple(kept) if len(kept) < len(self._struck) else (*kept, new)[-MOST_STRUCK:]
+        self.set_marks(tuple(others))
+
     def set_orders(self, orders: tuple[ShownOrder, ...]) -> None:
-        """Replace the commanders' orders; calls `on_publish` when they have changed."""
+        """Replace the commanders' orders; calls `on_publish` when they have changed. A new one to leave makes the exit the destination."""
         if orders != self.orders:
+            if {order.id for order in orders if order.urgent} - {order.id for order in self.orders}:
+                self.goal, self.errand = EXIT, ""
             self.orders = orders
             self._announce()
 

@@ -36,7 +36,7 @@ from echostep_app.page.player import PlayState
 from echostep_app.plan.pictures.symbols import level_lines, way_names
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD, north_rad
 from echostep_app.plan.places.globe import Globe, globe_of
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import Goal
 
 FRAME_S = 1.0 / 30.0  # shortest time between two frames
 GRID = 65535.0  # cells across the cloud: the greatest u16
@@ -212,7 +212,7 @@ class FrameHeader:
     cloud: CloudGrid | None
     beacons: tuple[BeaconMark, ...]
     guidance: ShownGuidance | None
-    goal: RoutePlace | None
+    goal: Goal | None
     errand: str
     orders: tuple[ShownOrder, ...]
     undo: UndoOffer | None
@@ -300,7 +300,7 @@ class FrameParts:
     trail_from: int = 0
     particles: ParticleSample | None = None
     guidance: ShownGuidance | None = None
-    goal: RoutePlace | None = None
+    goal: Goal | None = None
     errand: str = ""
     orders: tuple[ShownOrder, ...] = ()
     play: PlayState | None = None

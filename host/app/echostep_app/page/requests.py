@@ -63,6 +63,14 @@ class GoTo(msgspec.Struct, frozen=True, tag_field="kind", tag="go_to"):
         return RoutePlace(self.x_m, self.y_m, self.level)
 
 
+class Strike(GoTo, frozen=True, tag_field="kind", tag="strike"):
+    """There is no way at a place; where that was said before: there is one."""
+
+
+class GoOut(msgspec.Struct, frozen=True, tag_field="kind", tag="go_out"):
+    """Guide the wearer to the nearest exit."""
+
+
 class EndGuidance(msgspec.Struct, frozen=True, tag_field="kind", tag="go_nowhere"):
     """End the guidance to the destination that was chosen on a page."""
 
@@ -98,7 +106,9 @@ class Step(msgspec.Struct, frozen=True, tag_field="kind", tag="step"):
 
 
 PlayerRequest = SetPlaying | SetSpeed | Seek | Step
-_OwnRequest = Undo | Call | Consider | Met | Understood | GoTo | EndGuidance | FrameDrawn | PlayerRequest
+_OwnRequest = (
+    Undo | Call | Consider | Met | Understood | GoTo | Strike | GoOut | EndGuidance | FrameDrawn | PlayerRequest
+)
 Request = CheckIn | _OwnRequest
 _KEPT = msgspec.json.Decoder(Kept)
 _REQUESTS = msgspec.json.Decoder(Entered | _OwnRequest)

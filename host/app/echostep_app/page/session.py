@@ -25,6 +25,7 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.player import Player
 from echostep_app.page.shared import Shared
 from echostep_app.plan.places.bearing import heading_words
+from echostep_app.plan.routing import EXIT, Goal, Route, RoutePlace
 
 TOO_BUSY = "Not accepted: this is a replay, or the tracker is too busy."
 
@@ -41,6 +42,7 @@ class PageSession(GuardedSocket):
         self._shared = shared
         self._player = Player(mailbox.history) if mailbox.replay else None
         self._destination: Destination | None = None
+        self._aim: tuple[Goal | None, tuple[RoutePlace, ...]] = None, ()  # destination, and what is closed
         self._searches: set[asyncio.Task[None]] = set()
         self._last: PageScene | None = None
         self._particles: ParticleSample | None = None
@@ -88,9 +90,10 @@ class PageSession(GuardedSocket):
             case Call() | requests.Understood() | requests.Met():
                 refusal = self._take(request)
             case requests.GoTo() if request.level < levels:
-                self._mailbox.set_goal(request.goal)
-            case requests.EndGuidance():
-                self._mailbox.set_goal(None)
+                act = self._mailbox.strike if isinstance(request, requests.Strike) else self._mailbox.set_goal
+                act(request.goal)
+            case requests.GoOut() | requests.EndGuidance():
+                self._mailbox.set_goal(EXIT if isinstance(request, requests.GoOut) else None)
             case requests.SetPlaying() | requests.SetSpeed() | requests.Seek() | requests.Step() if self._player:
                 self._player.handle(request)
                 self._frame_due = True
@@ -148,10 +151,10 @@ class PageSession(GuardedSocket):
         return playing or any(new is not old for new, old in zip(now, had, strict=True))
 
     def _follow_goal(self) -> None:
-        """Guide to the run's goal, which any page may have changed."""
-        goal = self._mailbox.goal
-        if goal is not (self._destination.goal if self._destination else None):
-            self._destination, self._frame_due = None if goal is None else Destination(goal), True
+        """Guide to the run's goal, past what is closed; any page may have changed them."""
+        aim = goal, _ = self._mailbox.goal, self._mailbox.closed
+        if aim != self._aim:
+            self._destination, self._frame_due, self._aim = None if goal is None else Destination(goal), True, aim
 
     def _frame(self, scene: PageScene) -> bytes:
         """A frame with what this page has not been sent yet; from then on it counts as sent."""
@@ -188,20 +191,26 @@ class PageSession(GuardedSocket):
 
     def _guidance(self, scene: PageScene) -> ShownGuidance | None:
         """Guidance to the destination chosen on a page, else the run's; starts a search for a route when one is due."""
-        if not (scene.estimate and self._destination):
+        if not (scene.estimate and self._destination) or (scene.guidance and scene.guidance.own):
             return scene.guidance
         guidance = self._destination.guidance_at(scene.estimate)
-        if self._destination.needs_route(scene.estimate):
+        is_searched = not (self._mailbox.goes_back and self._destination.goal == EXIT)
+        if is_searched and self._destination.needs_route(scene.estimate):
             self._destination.searching = True
             task = asyncio.create_task(self._search(self._destination, scene.estimate))
             self._searches.add(task)
             task.add_done_callback(self._searches.discard)
         return guidance
 
+    def _way(self, estimate: Estimate, goal: Goal) -> Route:
+        """The route to a destination past what is closed."""
+        here = RoutePlace(estimate.x_m, estimate.y_m, estimate.level)
+        return self._shared.ways.past(self._mailbox.closed).way(here, goal)
+
     async def _search(self, destination: Destination, estimate: Estimate) -> None:
         """Search for the route to a destination in a thread; frames are sent meanwhile."""
         try:
-            route = await asyncio.to_thread(self._shared.route_finder.find, estimate, destination.goal)
+            route = await asyncio.to_thread(self._way, estimate, destination.goal)
             destination.set_route(route, "", estimate)
         except EchostepError as error:
             destination.set_route(None, str(error), estimate)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from echostep.plan import Plan
-from echostep_app.page.elements.guidance import RouteFinder
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.web.faults import Faults
+from echostep_app.plan.closures import OpenWays
 
 
 @dataclass(slots=True)
@@ -25,9 +25,9 @@ class PageCounts:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """One search for routes, one judge of check-ins, one list of faults, and the counts. `takes_files`: files may be dropped onto the pages."""
+    """One router, one judge of check-ins, one list of faults, and the counts. `takes_files`: files may be dropped onto the pages."""
 
-    route_finder: RouteFinder
+    ways: OpenWays
     taps: Taps
     faults: Faults = field(default_factory=Faults)
     counts: PageCounts = field(default_factory=PageCounts)
@@ -36,8 +36,8 @@ class Shared:
     @classmethod
     def of(cls, plan: Plan, *, takes_files: bool = False) -> Shared:
         """For the pages of a run on this plan."""
-        return cls(RouteFinder(plan), Taps(plan), takes_files=takes_files)
+        return cls(OpenWays(plan), Taps(plan), takes_files=takes_files)
 
     def on(self, plan: Plan) -> Shared:
         """For the same pages, which show a run on another plan from now on."""
-        return replace(self, route_finder=RouteFinder(plan), taps=Taps(plan))
+        return replace(self, ways=OpenWays(plan), taps=Taps(plan))

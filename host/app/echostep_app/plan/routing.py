@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Routes through a building: the shortest walk through doors, stairs and lifts.
+"""Routes through a building: the shortest walk through doors, stairs and lifts; the way out takes no lift.
 
 In: a plan, start and destination. Out: a `Route`: one polyline per level. Owns the grids of a plan's levels. Doors are gaps in the walls.
 The route is found on a grid [Dijkstra 1959] and then straightened, so that it bends only at corners.
@@ -7,18 +7,23 @@ The route is found on a grid [Dijkstra 1959] and then straightened, so that it b
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import math
+import threading
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.jit import kernel, part
 from echostep.plan import Plan
 from echostep.walls.near_walls import mark_near_walls
-from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.cropping import extent, is_clear
+from echostep_app.plan.places.exits import exits_of
 from echostep_app.plan.polyline import way_m
 
 # All assumed:
@@ -31,6 +36,7 @@ MOST_CELLS = 60_000_000  # on all levels together
 CLIMB = 3.0  # cost of a metre of height by stairs, in metres of level walk
 LIFT_M = 20.0  # cost of waiting for a lift, in metres of level walk
 TIGHT = 20.0  # cost of a metre of a connector within BODY_M of a wall, in metres of level walk: the way goes round a wall between two flights
+EXIT: Literal["exit"] = "exit"  # the destination that is the nearest exit
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +46,11 @@ class RoutePlace:
     x_m: float
     y_m: float
     level: int = 0
+
+
+Goal = RoutePlace | Literal["exit"]
+Cell = tuple[int, int, int]  # level, row, column
+Before = NDArray[np.int32]  # index of a cell's predecessor (levels, rows, columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,20 +75,26 @@ class Route:
 
 
 class Routes:
-    """Finds routes through one plan."""
+    """Finds routes through one plan, one at a time, in any thread; the grids are laid for the first one."""
 
     def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._lock = threading.Lock()
+        self._is_laid = False
+        self._exits: dict[Cell, RoutePlace] = {}
+        self._first: threading.Thread | None = None  # searches for `exit_m`
+        self._outwards: Before | None = None  # from each cell the next one to the nearest exit
+
+    def _lay(self) -> None:
         """Lay the grids; raises EchostepError for a plan that needs more than `MOST_CELLS`."""
-        ends = np.concatenate([level.solid.reshape(-1, 2) for level in plan.levels])
-        low = ends.min(0) if len(ends) else np.zeros(2)
-        high = ends.max(0) if len(ends) else np.zeros(2)
-        self._low = low - MARGIN_M
-        columns, rows = (int(n) for n in np.ceil((high + MARGIN_M - self._low) / CELL_M))
+        plan = self._plan
+        x0, y0, x1, y1 = extent(np.concatenate([level.solid for level in plan.levels]))
+        self._low = np.array([x0, y0]) - MARGIN_M
+        columns, rows = (int(n) for n in np.ceil((np.array([x1, y1]) + MARGIN_M - self._low) / CELL_M))
         if columns * rows * len(plan.levels) > MOST_CELLS:
             raise EchostepError(
                 f"plan {plan.name}: too large to find routes in: {columns} x {rows} cells on {len(plan.levels)} levels"
             )
-        self._plan = plan
         self._blocked = np.zeros((len(plan.levels), rows, columns), np.bool_)
         self._tight = np.zeros_like(self._blocked)
         for k, level in enumerate(plan.levels):
@@ -88,6 +105,7 @@ class Routes:
         self._lay_connectors(plan)
         self._height = np.array([level.height_m for level in plan.levels])
         self._lift = np.array([c.kind == "lift" for c in plan.connectors], np.bool_)
+        self._is_laid = True
 
     def _lay_connectors(self, plan: Plan) -> None:
         """The connector of each cell (-1: none), and which connector serves which level; cells of connectors are free, or tight where a wall is near.
@@ -104,15 +122,53 @@ class Routes:
                 self._tight[level_index][cells] |= self._blocked[level_index][cells]
                 self._blocked[level_index][cells] = False
 
-    def way(self, start: RoutePlace, end: RoutePlace) -> Route:
+    def way(self, start: RoutePlace, end: Goal) -> Route:
         """The cheapest route; raises EchostepError when a position is outside the plan, or without a route."""
-        a, b = self._cell(start, "the start"), self._cell(end, "the destination")
-        trail = _search(self._blocked, self._tight, self._connector, self._serves, self._height, self._lift, a, b)
-        if not len(trail):
-            raise EchostepError(
-                f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to ({end.x_m:.1f}, {end.y_m:.1f}): is a door missing in the plan?"
-            )
-        return Route(tuple(self._stretches(trail, start, end)))
+        with self._lock:
+            if not self._is_laid:
+                self._lay()
+            a = self._cell(start, "the start")
+            if isinstance(end, RoutePlace):
+                b, to = self._cell(end, "the destination"), f"({end.x_m:.1f}, {end.y_m:.1f})"
+                trail = _trace(self._search([a], b, self._serves), b)[::-1]
+            else:
+                trail, to = self._trail_out(a), "an exit"
+            if not len(trail):
+                raise EchostepError(
+                    f"there is no route from ({start.x_m:.1f}, {start.y_m:.1f}) to {to}: is a door missing in the plan?"
+                )
+            level, row, column = trail[-1].tolist()
+            place = end if isinstance(end, RoutePlace) else self._exits[level, row, column]
+            return Route(tuple(self._stretches(trail, start, place)))
+
+    def _trail_out(self, start: Cell) -> Ints:
+        """The trail to the nearest exit, without lifts; one search from all exits serves every start."""
+        if self._outwards is None:
+            for pose in exits_of(self._plan):
+                place = RoutePlace(pose.x_m, pose.y_m, pose.level)
+                with contextlib.suppress(EchostepError):  # one that is drawn into a wall
+                    self._exits[self._cell(place, "an exit")] = place
+            if not self._exits:
+                raise EchostepError("the plan shows no exit")
+            self._outwards = self._search(list(self._exits), (-1, -1, -1), self._serves & ~self._lift[:, None])
+        return _trace(self._outwards, start)
+
+    def _search(self, starts: list[Cell], end: Cell, serves: Bools) -> Before:
+        return _search(
+            self._blocked, self._tight, self._connector, serves, self._height, self._lift, np.array(starts), end
+        )
+
+    def exit_m(self, place: RoutePlace) -> float | None:
+        """Length of the way out; None where there is none, and until the first search, in a thread of its own, is over."""
+        if self._first is None:
+            self._first = threading.Thread(target=self.exit_m, args=(place,), daemon=True)
+            self._first.start()
+        if self._outwards is None and threading.current_thread() is not self._first:
+            return None
+        try:
+            return self.way(place, EXIT).length_m
+        except EchostepError:
+            return None
 
     def _stretches(self, trail: Ints, start: RoutePlace, end: RoutePlace) -> list[Stretch]:
         """Cut a trail of cells (k, 3) into one polyline per level, straightened; its ends are start and end unless a wall is in between."""
@@ -179,20 +235,23 @@ class Routes:
 @kernel
 def _search(
     blocked: Bools, tight: Bools, connector: Ints, serves: Bools, height: Floats, lift: Bools,
-    start: tuple[int, int, int], end: tuple[int, int, int],
-) -> Ints:  # fmt: skip
-    """The cheapest trail of cells (k, 3): level, row, column; (0, 3) without a route [Dijkstra 1959].
+    starts: Ints, end: tuple[int, int, int],
+) -> Before:  # fmt: skip
+    """From each cell the next one on the cheapest trail to one of the starts (n, 3); itself in a start, -1 where no trail was found [Dijkstra 1959].
 
-    `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns). `serves` (connectors, levels).
+    `blocked`, `tight` and `connector` (index, -1 for none) are (levels, rows, columns), as the result. `serves` (connectors, levels).
+    The search ends at the cell `end` (level, row, column); at (-1, -1, -1) never.
     """
     levels, rows, columns = blocked.shape
     size = rows * columns
     cost = np.full(levels * size, np.inf)
-    before = np.full(levels * size, -1, np.int64)
-    first = start[0] * size + start[1] * columns + start[2]
+    before = np.full(levels * size, -1, np.int32)
     last = end[0] * size + end[1] * columns + end[2]
-    cost[first] = 0.0
-    heap = [(0.0, first)]
+    heap = [(0.0, np.int64(0)) for _ in range(0)]
+    for i in range(len(starts)):
+        first = starts[i, 0] * size + starts[i, 1] * columns + starts[i, 2]
+        cost[first], before[first] = 0.0, first
+        heapq.heappush(heap, (0.0, first))
     while heap:
         spent, here = heapq.heappop(heap)
         if here == last:
@@ -220,20 +279,22 @@ def _search(
                 if total < cost[there]:
                     cost[there], before[there] = total, here
                     heapq.heappush(heap, (total, there))
-    return _trace(before, first, last, rows, columns)
+    return before.reshape(blocked.shape)
 
 
-@part
-def _trace(before: Ints, first: int, last: int, rows: int, columns: int) -> Ints:
-    """The trail to cell `last`, followed back through each cell's predecessor; (0, 3) when it was not reached."""
-    count, cell = 1, last
-    while cell != first and cell >= 0:
-        cell, count = before[cell], count + 1
-    trail = np.empty((count if cell == first else 0, 3), np.int64)
-    cell = last
-    for i in range(len(trail) - 1, -1, -1):
-        trail[i] = cell // (rows * columns), cell % (rows * columns) // columns, cell % columns
-        cell = before[cell]
+@kernel
+def _trace(before: Before, cell: tuple[int, int, int]) -> Ints:
+    """The trail of cells (k, 3) from a cell through each cell's predecessor: level, row, column; (0, 3) where there is none."""
+    _, rows, columns = before.shape
+    begin = (cell[0] * rows + cell[1]) * columns + cell[2]
+    flat, here, count = before.ravel(), begin, 1
+    while flat[here] >= 0 and flat[here] != here:
+        here, count = flat[here], count + 1
+    trail = np.empty((count if flat[here] == here else 0, 3), np.int64)
+    here = begin
+    for i in range(len(trail)):
+        trail[i] = here // (rows * columns), here % (rows * columns) // columns, here % columns
+        here = flat[here]
     return trail
 
 

@@ -16,16 +16,15 @@ from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from echostep.errors import EchostepError, words_of
+from echostep.errors import words_of
 from echostep.localization import Estimate
-from echostep.ports.chunks import LINES, TEAM, Portion
+from echostep.ports.chunks import LINES, Portion
 from echostep.ports.people.check_in import PERSON
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS
 from echostep.recording import Recording, clock_of, utc_offset_ns
 from echostep.tracker import Tracker
 from echostep_app.extras import lacks
-from echostep_app.guidance.guided_rescue import GuidedRescue
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
@@ -33,6 +32,7 @@ from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.mailbox import popped
 from echostep_app.plan.places.refusals import refusals
+from echostep_app.plan.routing import EXIT
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
 from echostep_app.printing.progress import progress_line
@@ -88,7 +88,7 @@ class Session:
         self.source = source
         self.recorded = recorded
         self.output = output
-        self.guided = guidance_of(tracker, guide_to)
+        self.guided, self._leaves = guidance_of(tracker, guide_to), guide_to == EXIT
         self.losses = Losses(tracker)
         self.arrivals = Arrivals()
         self.page: LivePage | None = None
@@ -138,6 +138,8 @@ class Session:
             keeps=self.source == "simulated",
         )
         print_page(console, page.server.urls)
+        if self._leaves and self.recorded is None:  # past what is struck out on a page
+            page.mailbox.set_goal(EXIT)
         page.fault_sources.append(FaultNews().words)
         page.rate_meter.ports.update(self.arrivals.urls)
         note = self.recorded.metadata.get("note", "") if self.recorded else ""
@@ -191,10 +193,6 @@ class Session:
         outlet, publishing, broker = self.output.outlet, self._publishing, self._broker
         if self.recorded is not None:
             return
-        if isinstance(self.guided, GuidedRescue) and broker is None:
-            raise EchostepError(
-                f"--guide wearer:{self.guided.name} needs the team's broker: --publish mqtt://HOST --name YOURS"
-            )
         if outlet is None or publishing is None or broker is None:
             return
         from echostep_app.session.team.subscription import TeamSubscription
@@ -207,14 +205,11 @@ class Session:
             self.page.fault_sources.append(lambda: "" if publishing.fault else subscription.fault)
 
     def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
-        """Read teammates and beacons; the place of the wearer whom a rescuer is guided to; and for a page the commanders' marks."""
-        from echostep_app.session.team.feeds import MarkFeed, TeamFeed
+        """Read teammates and beacons, and for a page the commanders' marks."""
+        from echostep_app.session.team.feeds import MarkFeed
         from echostep_app.session.team.teammate_feed import TeammateFeed
 
         page, plan = self.page, self.tracker.plan
-        if isinstance(self.guided, GuidedRescue):
-            feed = TeamFeed(subscription, outlet.team, self.guided.name, plan, _print_line)
-            self.message_sources.append((TEAM, feed.pop))
         teammates = TeammateFeed(subscription, outlet, run, plan)
         self._sinks.append(teammate_sink(teammates, self.tracker, page))
         self.message_sources.append((TEAM_BEACONS, teammates.beacons))

@@ -9,9 +9,7 @@ from echostep.plan.model import (
     FORMAT_VERSION,
     NO_PLAN,
     Connector,
-    ConnectorKind,
     Door,
-    DoorState,
     Georeference,
     Level,
     Plan,
@@ -23,3 +21,4 @@ from echostep.plan.model import (
     parse_plan,
     sides,
 )
+from echostep.plan.plan_file import ConnectorKind, DoorState

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
-from echostep.additions import svg_of
+from echostep.additions import needed, svg_of
 from echostep.arrays import Floats
 from echostep.errors import EchostepError, replaced
 from echostep.fields import checked, short
@@ -26,9 +26,6 @@ from echostep.plan import plan_file
 from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
 
 FORMAT_VERSION = 1
-ConnectorKind = plan_file.ConnectorKind
-DoorState = plan_file.DoorState
-QuestionAbout = plan_file.QuestionAbout
 # Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
 MOST_PLACE_SD_M = 1.0
 WITHOUT_LENGTH = "a wall without length: both ends are the same point"
@@ -52,14 +49,13 @@ class Door:
     """A gap in the walls; `line`: x0, y0, x1, y1 in metres, from one jamb to the other."""
 
     line: tuple[float, float, float, float]
-    state: DoorState = "unknown"
+    state: plan_file.DoorState = "unknown"
     name: str = ""
 
     @property
     def width_m(self) -> float:
         """Distance between the jambs."""
-        x0, y0, x1, y1 = self.line
-        return math.hypot(x1 - x0, y1 - y0)
+        return math.dist(self.line[:2], self.line[2:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +66,7 @@ class Question:
     """
 
     text: str
-    about: QuestionAbout
+    about: plan_file.QuestionAbout
     at_m: tuple[float, float]
     lines_m: tuple[tuple[float, float, float, float], ...] = ()
     is_proposed: bool = False
@@ -131,7 +127,7 @@ def is_no_plan(place_sd: Floats) -> bool:
 class Connector:
     """Stairs, a lift or a ramp: the same outline (n, 2) on all its levels (indices into Plan.levels, ascending)."""
 
-    kind: ConnectorKind
+    kind: plan_file.ConnectorKind
     name: str
     levels: tuple[int, ...]
     outline_m: Floats = field(repr=False)
@@ -184,6 +180,11 @@ class Plan:
     def _repr_svg_(self) -> str | None:
         """All levels as a picture, for a notebook; None without matplotlib, so that the repr is shown."""
         return svg_of(self)
+
+    @property
+    def exits(self) -> tuple[Pose, ...]:
+        """A pose outside each way out, heading away from it; empty where the plan shows none. Raises EchostepError without echostep-app."""
+        return tuple(needed("exits", "Plan.exits")(self))
 
     @property
     def is_drawn(self) -> bool:

@@ -21,7 +21,7 @@ MTX = "mtx"
 FOOT = "foot"  # a second board, at the ankle, in place of an MTx
 GATEWAY = "gateway"
 LINES = "lines"  # text of any foot IMU, recorded; its samples are chunks of MTX [echostep_app.session.runs.live_lines]
-TEAM = "team"  # places of teammates, for a rescuer's guidance
+TEAM = "team"  # places of a teammate, which older recordings have; not read
 
 LATEST_NS = 1 << 62  # a later arrival time (damage in a recording) is replaced by this one; assumed
 

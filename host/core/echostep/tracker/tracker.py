@@ -35,7 +35,7 @@ from echostep.localization import Building, Estimate, FilterSettings, Start, Tra
 from echostep.odometry import FrontEnd, WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
-from echostep.ports.chunks import FOOT, GATEWAY, TEAM, Chunk, Portion, portion_of
+from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
 from echostep.ports.imu_samples import SampleCounter
 from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.people.meeting import MEETING
@@ -82,7 +82,6 @@ class Tracker:
         self.gateway = Gateway()
         self._imu = SampleCounter(s.mtx.rate_hz)  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
-        self.team_watchers: list[Callable[[bytes], None]] = []  # called with each chunk of the port TEAM
         self._readings: list[BeaconReading] = []  # waiting for their segment
         self._meetings = MeetingQueue()
         self._team_beacons = TeamBeaconMap()
@@ -186,14 +185,11 @@ class Tracker:
     def take(self, portion: Portion) -> list[Estimate]:
         """Process many chunks; the estimates are the same as for the chunks one by one."""
         estimates: list[Estimate] = []
-        for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, TEAM, MEETING, PERSON):
+        for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, MEETING, PERSON):
             estimates += self._track(piece)
             if len(piece.of(TEAM_BEACONS).row):
                 self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
             self.watch.advance()
-            if from_team := piece.of(TEAM).received:
-                for receive in self.team_watchers:
-                    receive(from_team)
             for port, apply in ((MEETING, self._receive_meeting), (PERSON, self._apply_person)):
                 message = piece.of(port)
                 if len(message.row):

@@ -15,17 +15,12 @@ from echostep.arrays import Floats
 from echostep.beacons.step import mean_place
 from echostep.jit import part
 from echostep_app.guidance.contact import Contact, allowed_silence, update_contact
-from echostep_app.guidance.cues import GuidanceSettings
+from echostep_app.guidance.cues import AHEAD_M, ARRIVED_M, SILENCE_S
 from echostep_app.plan.polyline import nearest, turn_ahead
 from echostep_studies.fischer2008.beacon_cloud import BeaconCloud
 from echostep_studies.fischer2008.learnt_trail import believed_trail, span_near_heard
 from echostep_studies.fischer2008.paper_fusion import Fusion, note_reliable
 from echostep_studies.fischer2008.walker import TICK_S, GuidedWalker
-
-GUIDANCE = GuidanceSettings()
-AHEAD_M = GUIDANCE.ahead_m
-ARRIVED_M = GUIDANCE.arrived_m  # distance of the estimate from the exit at which guidance ends
-SILENCE_S = GUIDANCE.silence_s  # without a measurement until the walker is sent back
 
 
 class Advice(NamedTuple):

@@ -4,22 +4,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, LikelyPlace, Start, TrackStatus
 from echostep.path import PathSegment
-from echostep.plan import Plan, Pose
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import CheckIn
 from echostep.tracker import Tracker
 from echostep_app.page import requests
-from echostep_app.page.elements.guidance import Destination, RouteFinder
+from echostep_app.page.elements.guidance import Destination
 from echostep_app.page.elements.lookahead import extrapolate, moves_as_one
 from echostep_app.page.elements.scene import status_text
 from echostep_app.page.elements.stream_rates import StreamRateMeter
@@ -28,7 +26,7 @@ from echostep_app.page.elements.undo_offer import UndoClock, UndoOffer
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import SceneHistory
 from echostep_app.page.player import Player
-from echostep_app.plan.routing import RoutePlace
+from echostep_app.plan.routing import RoutePlace, Routes
 from page.frames import LOCAL, PLAN, scene, told
 from plan.imported_plans import seven_floors
 
@@ -68,14 +66,14 @@ def test_an_errand_finds_its_way_around_walls() -> None:
     upstairs = Destination(RoutePlace(13.0, 4.5, 2)).guidance_at(here)
     assert upstairs.text == "Looking for a way, 2 floors up"
     assert destination.needs_route(here)
-    destination.set_route(RouteFinder(PLAN).find(here, goal), "", here)
+    destination.set_route(Routes(PLAN).way(RoutePlace(9.0, 7.5), goal), "", here)
     way = destination.guidance_at(here)
     assert not destination.needs_route(here)
     assert (way.left_m or 0.0) > 5.5  # through the door at (13, 6.5)
     assert way.path[-1] == (13.0, 4.5)
     assert abs(way.arrow_rad or 0.0) < 0.3
     with pytest.raises(EchostepError) as outside:
-        RouteFinder(PLAN).find(here, RoutePlace(500.0, 500.0))
+        Routes(PLAN).way(RoutePlace(9.0, 7.5), RoutePlace(500.0, 500.0))
     destination.set_route(None, str(outside.value), here)
     none = destination.guidance_at(here)
     assert "No way was found: the destination (500.0, 500.0) is outside the plan" in none.text
@@ -151,30 +149,6 @@ def test_a_step_ahead_changes_the_status_only_where_it_widens_the_radius(
     """Half of the probability may be within 5 m of a position whose 95 % radius is 11 m: it stays `uncertain` while a foot lands."""
     last, landed = told(sd_m=sd_m, status=status), PathSegment(1.0, 2.0, 0.7, 0.0, 0.0, 0.0, step_sd_m, 0.0, 2)
     assert status_text(extrapolate(last, landed, [landed])) == then
-
-
-def crosses_a_wall(plan: Plan, level: int, line_m: Sequence[Sequence[float]]) -> bool:
-    walls = shapely.STRtree(shapely.linestrings(plan.levels[level].solid.reshape(-1, 2, 2)))
-    return bool(len(walls.query(shapely.LineString(line_m), predicate="intersects")))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("plan", [PLAN, seven_floors()], ids=["demo", "seven floors"])
-def test_no_way_leads_through_a_wall_wherever_it_begins(plan: Plan) -> None:
-    """Places are drawn anywhere, in walls and close behind them too; a place without a way is an error, not a line."""
-    rng, finder, found = np.random.default_rng(1), RouteFinder(plan), 0
-    for _ in range(60):
-        x, y, u, v = (float(rng.uniform(0.3, most)) for most in (24.0, 13.0, 24.0, 13.0))
-        level, goal = (int(k) for k in rng.integers(0, len(plan.levels), 2))
-        try:
-            route = finder.find(replace(told(x, y), level=level), RoutePlace(u, v, goal))
-        except EchostepError:
-            continue
-        found += 1
-        for stretch in route.stretches:
-            if len(stretch.line_m) > 1:
-                assert not crosses_a_wall(plan, stretch.level, stretch.line_m.tolist()), (x, y, u, v)
-    assert found > 40
 
 
 def test_what_a_tap_would_do_is_said_before() -> None:

@@ -34,7 +34,7 @@ from waiting import PATIENCE_S
 SEED = 5
 TO = RoutePlace(9.5, 10.8)
 WAY = Route((Stretch(0, np.array([[2.0, 7.5], [9.5, 7.5]])), Stretch(1, np.array([[9.5, 7.5], [9.5, 10.8]]))))
-AHEAD = Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "Straight ahead.", 10.8, 0.1)
+AHEAD = Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "Straight ahead.", 10.8)
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +146,7 @@ def test_a_replay_shows_the_cue_and_the_beacons_of_its_moment(chunks: list[Chunk
                 frame = until(page, at(t_s))
                 assert frame["t_s"] == cue.t_s
                 assert (frame["guidance"]["kind"], frame["guidance"]["text"]) == (cue.kind.value, cue.text)
-                assert frame["guidance"]["arrow_rad"] == cue.aim_rad
+                assert frame["guidance"]["arrow_rad"] == cue.arrow_rad
             page.send(json.dumps({"kind": "seek", "t_s": 1e9}))
             last = until(page, lambda frame: frame["t_s"] == guided.cues[-1].t_s)
             page.send(json.dumps({"kind": "seek", "t_s": 0.0}))
@@ -185,13 +185,7 @@ def test_a_step_that_is_shown_before_its_echoes_turns_the_arrow(chunks: list[Chu
     scenes: list[PageScene] = []
     estimates: list[Estimate] = []
     with LivePage(tracker, "test", LOCAL, guided) as live:
-        publish = live.mailbox.publish
-
-        def kept(scene: PageScene) -> None:
-            scenes.append(scene)
-            publish(scene)
-
-        live.mailbox.publish = kept  # type: ignore[method-assign]
+        live.mailbox.publish = scenes.append  # type: ignore[assignment, method-assign]
         for chunk in chunks:
             portion = portion_of([chunk])
             live.note_arrival()

@@ -124,7 +124,7 @@ def test_without_a_place_nothing_on_the_map_looks_like_one(browser: Any) -> None
 
 
 def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any) -> None:
-    way = guidance_of_cue(Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "", 7.5, 0.1), WAY, 0, None)
+    way = guidance_of_cue(Cue(1.0, CueKind.AHEAD, "Straight ahead", 0.1, "", 7.5), WAY, 0, None)
     with served() as (server, mailbox):
         mailbox.publish(replace(scene(), guidance=way))
         page = loaded_page(browser, server.url, {"viewport": {"width": 1280, "height": 800}}, READY)

@@ -1,24 +1,22 @@
 # SPDX-License-Identifier: MIT
 """Guidance as a page shows it: of the run's cues, or to a destination that was chosen on the page.
 
-In: cues with their route; for a destination chosen on a page: estimates, a place, the plan. Out: `ShownGuidance`. Owns the plan's route planner
-(made at the first request, in a thread) and the progress along a route to a chosen destination. Until that route is found, and if there is none,
-neither a direction nor a line is shown.
+In: cues with their route; for a destination chosen on a page: estimates, the destination, routes to it. Out: `ShownGuidance`. Owns the progress along
+a route to a chosen destination. Until that route is found, and if there is none, neither a direction nor a line is shown.
 """
 
 from __future__ import annotations
 
 import math
-import threading
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from echostep.localization import Estimate
-from echostep.plan import Plan
 from echostep_app.guidance.cues import Cue, CueKind, Guide
+from echostep_app.guidance.guided_run import ARRIVED
 from echostep_app.plan.polyline import along, way_m
-from echostep_app.plan.routing import Route, RoutePlace, Routes
+from echostep_app.plan.routing import EXIT, Goal, Route, RoutePlace
 
 SEARCH_INTERVAL_S = 5.0  # shortest time between two searches for a route, in data time
 ON_THE_WAY = (CueKind.AHEAD, CueKind.TURN, CueKind.CHANGE, CueKind.OFF)
@@ -63,7 +61,7 @@ def guidance_of_cue(cue: Cue, route: Route | None, level: int, before: ShownGuid
     spoken = (cue.spoken, cue.t_s) if cue.spoken else previous
     path = () if route is None or math.isnan(cue.left_m) else remaining_path(route, level, cue.left_m)
     left_m = cue.left_m if cue.kind in ON_THE_WAY else None
-    return ShownGuidance(cue.kind.value, cue.text, cue.aim_rad, left_m, path, *spoken)
+    return ShownGuidance(cue.kind.value, cue.text, cue.arrow_rad, left_m, path, *spoken)
 
 
 def remaining_path(route: Route, level: int, left_m: float) -> Points:
@@ -83,25 +81,10 @@ def remaining_path(route: Route, level: int, left_m: float) -> Points:
     return tuple(points)
 
 
-class RouteFinder:
-    """Finds routes through a plan. A search is slow, so call `find` in a thread; one search runs at a time."""
-
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self._routes: Routes | None = None
-        self._lock = threading.Lock()
-
-    def find(self, estimate: Estimate, goal: RoutePlace) -> Route:
-        """The route from an estimate to a place; raises EchostepError without one."""
-        with self._lock:
-            self._routes = self._routes or Routes(self._plan)
-            return self._routes.way(RoutePlace(estimate.x_m, estimate.y_m, estimate.level), goal)
-
-
 class Destination:
     """A destination chosen on a page: estimates and, once it is found, a route -> guidance."""
 
-    def __init__(self, goal: RoutePlace) -> None:
+    def __init__(self, goal: Goal) -> None:
         self.goal = goal
         self.searching = False
         self._guide: Guide | None = None
@@ -116,7 +99,7 @@ class Destination:
     def set_route(self, route: Route | None, reason: str, estimate: Estimate) -> None:
         """The result of a search from an estimate: a route, or None and the reason. Without a route it is repeated after `SEARCH_INTERVAL_S`."""
         self.searching = False
-        self._guide = Guide(route) if route is not None and route.stretches else None
+        self._guide = Guide(route, arrived=ARRIVED[self.goal == EXIT]) if route else None
         self._reason, self._last = reason, None
         self._search_again_s = math.inf if self._guide else estimate.t_s + SEARCH_INTERVAL_S
 
@@ -128,20 +111,23 @@ class Destination:
         return self._last[1]
 
     def _along_route(self, estimate: Estimate) -> ShownGuidance:
-        """The next cue of the route; when the estimate has left the route, a new search becomes due."""
+        """The next cue of the route; when the estimate has left the route, or its levels, a new search becomes due."""
         assert self._guide
         cue = self._guide.cue(estimate)
-        if cue.kind is CueKind.OFF and self._search_again_s == math.inf:
+        if self.goal == EXIT and self._last is None:
+            cue = replace(cue, spoken=f"Way out. {cue.spoken}")
+        is_off = cue.kind is CueKind.OFF or estimate.level not in {s.level for s in self._guide.route.stretches}
+        if is_off and self._search_again_s == math.inf:
             self._search_again_s = estimate.t_s
         return guidance_of_cue(cue, self._guide.route, estimate.level, self._last[1] if self._last else None)
 
 
-def without_route(goal: RoutePlace, estimate: Estimate, reason: str) -> ShownGuidance:
+def without_route(goal: Goal, estimate: Estimate, reason: str) -> ShownGuidance:
     """The guidance while no route is known: no direction and no line, which would lead through walls.
 
     `reason`: why there is none, empty while it is searched for.
     """
-    levels = goal.level - estimate.level
+    levels = goal.level - estimate.level if isinstance(goal, RoutePlace) else 0
     climb = f", {abs(levels)} floor{'s' if abs(levels) > 1 else ''} {'up' if levels > 0 else 'down'}" if levels else ""
     if not reason:
         return ShownGuidance(LOOKING, f"Looking for a way{climb}", None, None, ())

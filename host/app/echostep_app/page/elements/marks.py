@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Marks as a page draws them: beacons, and marks of commanders (a cleared room, a hazard, a meeting point); the newest meeting in words.
+"""Marks as a page draws them: beacons, and marks of commanders (a cleared room, a hazard, no way, a meeting point); the newest meeting in words.
 
 In: a tracker, in its thread; its state. Out: `BeaconMark`s that any thread may read, `ShownMeeting`. Owns the words.
 """
@@ -7,6 +7,7 @@ In: a tracker, in its thread; its state. Out: `BeaconMark`s that any thread may 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import islice
 
@@ -15,9 +16,11 @@ from echostep.particles.ellipse import CHI2_95, ellipse95
 from echostep.ports.people.team_beacons import MOST_SHARED
 from echostep.tracker import Tracker
 from echostep.tracker.state import TrackerState
+from echostep_app.plan.routing import RoutePlace
 
 # A beacon counts as heard this long after its last reading: longer than a step, at whose end readings are used
 RECENT_S = 1.5
+BLOCKED = "blocked"  # kind of a mark: there is no way
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,11 @@ class ShownMark:
     y_m: float
     level: int
     by: str
+
+
+def closed_places(marks: Iterable[ShownMark]) -> tuple[RoutePlace, ...]:
+    """The places at which marks say that there is no way."""
+    return tuple(RoutePlace(mark.x_m, mark.y_m, mark.level) for mark in marks if mark.mark == BLOCKED)
 
 
 @dataclass(frozen=True, slots=True)

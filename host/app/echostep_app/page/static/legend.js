@@ -26,6 +26,7 @@ const BUILDING = [
 const MARKS = [
   [shape('M-8-8H8V8H-8Z', 'good', 'halo') + letter('✓', 'good'), 'cleared, marked by a commander'],
   [shape('M0-10 10 0 0 10-10 0Z', 'bad', 'halo') + letter('!', 'bad'), 'hazard'],
+  [shape('M-4-9H4L9-4V4L4 9H-4L-9 4V-4Z', 'bad', 'halo') + letter('✕', 'bad'), 'no way'],
   [disc(9, 'here', 'halo') + letter('M', 'here'), 'meeting point'],
 ];
 const ARROW = 'M12 0-8 7-4 0-8-7Z';

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Marks that commanders set: a cleared room (square, tick), a hazard (diamond, exclamation mark), a meeting point (circle, M); on the wearer's and the commander's page.
+// Marks that commanders set: a cleared room (square, tick), a hazard (diamond, exclamation mark), no way (octagon, cross), a meeting point (circle, M); on the wearer's and the commander's page.
 
 const LOOKS = {
   cleared: { letter: '✓', colour: 'good', words: 'cleared', shape: [[-9, -9], [9, -9], [9, 9], [-9, 9]] },
   hazard: { letter: '!', colour: 'bad', words: 'hazard', shape: [[0, -13], [13, 0], [0, 13], [-13, 0]] },
+  blocked: { letter: '✕', colour: 'bad', words: 'no way', shape: [[-5, -11], [5, -11], [11, -5], [11, 5], [5, 11], [-5, 11], [-11, 5], [-11, -5]] },
   meeting: { letter: 'M', colour: 'here', words: 'meeting point', shape: null },
 };
 

@@ -6,7 +6,7 @@ import { tr } from './language.js';
 import { remember } from './storage.js';
 
 const LABELS = {
-  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', understood: 'Understood', order: 'Order', go_to: 'Go here', go_nowhere: 'End of the guidance',
+  call: 'Help!', check_in: 'I am here', undo: 'Undo', met: 'I met a teammate', understood: 'Understood', order: 'Order', go_to: 'Go here', go_out: 'Way out', strike: 'No way', go_nowhere: 'End of the guidance',
   acknowledge: 'Acknowledge', send: 'Send', mark: 'Mark', unmark: 'Remove', crew: 'Crew', crew_does: 'Crew', log: 'Note',
 };
 const FRESH_S = { check_in: 5, undo: 5, met: 5 };  // what is said of this moment is wrong later; assumed

@@ -6,7 +6,6 @@ In: a `Plan`. Out: `Faces` of each level, and groups of connected faces. Owns no
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -102,16 +101,16 @@ def _join(leader: dict[Face, Face], one: Face, other: Face) -> None:
 
 def door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
     """The two faces that each door separates."""
-    sides = np.array([_beside(door) for door in doors]).reshape(-1, 2)
+    sides = np.array([beside(door) for door in doors]).reshape(-1, 2)
     pairs = faces.indices_of(sides).reshape(-1, 2)
     return [(int(a), int(b)) for a, b in pairs]
 
 
-def _beside(door: Door) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The points `BESIDE_M` from a door's middle, on its two sides."""
+def beside(door: Door, by_m: float = BESIDE_M) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The points `by_m` from a door's middle, on its two sides."""
     x0, y0, x1, y1 = door.line
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    u, v = BESIDE_M * (y1 - y0) / math.dist((x0, y0), (x1, y1)), BESIDE_M * (x0 - x1) / math.dist((x0, y0), (x1, y1))
+    u, v = (by_m * d / door.width_m for d in (y1 - y0, x0 - x1))
     return (x + u, y + v), (x - u, y - v)
 
 

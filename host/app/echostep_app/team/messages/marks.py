@@ -49,11 +49,11 @@ MARKS, ALL = f"{ROOT}/mark/#", f"{ROOT}/#"
 MOST_MARKS, MOST_ACKS, MOST_ERRANDS = 256, 1024, 256  # further ones are refused
 MOST_ANSWERS = 64  # that wait; further ones replace the oldest
 MOST_REMOVED = 1024  # removed marks that are remembered, the newest ones
-MarkKind = Literal["cleared", "hazard", "meeting"]
+MarkKind = Literal["cleared", "hazard", "blocked", "meeting"]
 
 
 class Mark(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A place on the plan: a room that is cleared, a hazard, a meeting point. `by`: who set it; `unix_s`: when, by that clock.
+    """A place on the plan: a room that is cleared, a hazard, no way, a meeting point. `by`: who set it; `unix_s`: when, by that clock.
 
     `removed`: it is not there any more.
     """

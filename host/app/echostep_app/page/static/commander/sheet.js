@@ -5,7 +5,7 @@ import { recall, remember } from '../storage.js';
 import { markWords } from '../marks.js';
 import { said } from '../text.js';
 
-const KINDS = ['cleared', 'hazard', 'meeting'];
+const KINDS = ['cleared', 'hazard', 'blocked', 'meeting'];
 const $ = (id) => document.getElementById(id);
 
 export class Sheet {

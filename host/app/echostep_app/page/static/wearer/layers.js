@@ -23,7 +23,7 @@ export class WearerPainter extends Painter {
     const { told: estimate, guidance, goal } = scene.frame ?? {}, path = guidance && estimate?.placed && estimate.level === scene.level ? guidance.path : [];
     if (path.length > 1) this.line(path.map(([x, y]) => view.toScreen(x, y)), this.colour.goal, 3, [8, 7]);
     if (goal?.level === scene.level) this.flag(view, [goal.x_m, goal.y_m]);
-    else if (path.length && !guidance.own) this.flag(view, path.at(-1));
+    else if (path.length && (goal === 'exit' || !guidance.own)) this.flag(view, path.at(-1));
     if (shows('beacons')) this.beacons(view, (scene.frame?.beacons ?? []).filter((beacon) => beacon.level === scene.level));
     if (estimate?.placed && estimate.level === scene.level) {  // without a place nothing is drawn that looks like one
       if (!scene.isOld) {  // of then only the place

@@ -13,19 +13,22 @@ export class Orders {
     $('understood').onclick = () => this.understand();
   }
 
-  // The first of those that are not understood yet; an answer that is on its way counts.
-  show(orders) {
+  get isUrgent() { return this.orders.some(({ urgent }) => urgent); }
+
+  // The first of those that are not understood yet; an answer that is on its way counts. `guidance`: to an exit, which the order to leave speaks.
+  show(orders, guidance = null) {
     for (const id of this.understood) if (!orders.some((one) => one.id === id)) this.understood.delete(id);
     this.orders = orders.filter(({ id }) => !this.understood.has(id));
     const [order] = this.orders;
     $('order').hidden = !order;
     if (!order) return;
-    const text = tr(order.text), at = this.said.get(order.id);
+    const cue = (order.urgent && guidance?.arrow_rad != null && guidance.text) || '', id = `${order.id} ${Boolean(cue)}`;
+    const text = tr(order.text), at = this.said.get(id);
     if ($('order-text').textContent !== text) $('order-text').textContent = text;
     $('order').dataset.urgent = String(order.urgent);
     if (at !== undefined && (!order.urgent || Date.now() - at < AGAIN_MS)) return;
-    this.said.set(order.id, Date.now());
-    this.speak(order.text);
+    this.said.set(id, Date.now());
+    this.speak(cue ? `${order.text} ${cue}.` : order.text);
   }
 
   understand() {

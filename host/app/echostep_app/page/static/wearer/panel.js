@@ -23,7 +23,7 @@ export class Panel {
     this.plan = plan;
     this.shownGoal = null;
     document.title = title;
-    $('goal').replaceChildren(new Option(tr('Go to…'), ''), new Option(tr('a place on the map'), 'map'),
+    $('goal').replaceChildren(new Option(tr('Go to…'), ''), new Option(tr('Way out'), 'exit'), new Option(tr('a place on the map'), 'map'),
       ...plan.levels.flatMap(({ rooms, name }, level) => rooms.map((room, k) => new Option(plan.levels.length > 1 ? `${room.name} (${name})` : room.name, `${level} ${k}`))));
   }
 
@@ -89,7 +89,9 @@ export class Panel {
     $('goal').value = goal ? this.optionOf(goal) : '';
   }
 
-  optionOf({ x_m, y_m, level }) {
+  optionOf(goal) {
+    if (goal === 'exit') return goal;
+    const { x_m, y_m, level } = goal;
     const room = this.plan.levels[level].rooms.findIndex(({ at_m: [x, y] }) => x === x_m && y === y_m);
     return room < 0 ? 'map' : `${level} ${room}`;
   }

@@ -60,12 +60,15 @@ export class Wearer {
       if ($('met').value) send('met', { name: $('met').value });
       $('met').value = '';
     };
+    $('way-out').onclick = () => this.goalChosen('exit');
     $('goal').onchange = () => this.goalChosen($('goal').value);
-    $('sheet-go').onclick = () => {
+    const tapped = (kind) => () => {
       const { x_m, y_m, level } = this.taps.ghost;
       this.taps.drop();
-      this.go([x_m, y_m], level);
+      send(kind, { x_m, y_m, level });
     };
+    $('sheet-go').onclick = tapped('go_to');
+    $('sheet-strike').onclick = tapped('strike');
   }
 
   get estimate() { return this.page.scene.frame?.told; }
@@ -149,9 +152,12 @@ export class Wearer {
     if (marks) panel.marks(marks);
     extend(scene.trail, received.trail);
     speech.alarm(play ? null : alarm);
-    if (!alarm) speech.update(received.guidance);
+    const leaves = !play && received.goal === 'exit';
+    if (leaves && !this.leaves) speech.set(true);
+    this.leaves = leaves;
+    if (!alarm) speech.update(received.guidance, this.orders.isUrgent);
     if (!play && !alarm) speech.sent(received.errand);
-    this.orders.show(play ? [] : received.orders);
+    this.orders.show(play ? [] : received.orders, leaves ? received.guidance : null);
     panel.frame(received);
     this.taps.undoable(received.undo);
     page.showFloors();
@@ -228,13 +234,13 @@ export class Wearer {
     const before = this.mode, { level } = this.page.scene;
     this.enter(null);
     if (before === 'go') return this.go(position, level);
-    this.taps.put(position, heading_rad, level, false);
+    this.taps.put(position, heading_rad, level);
     $('sheet-here').focus({ preventScroll: true });
   }
 
   tapped(position) {
     if (this.mode === 'measure') this.page.measured(position);
-    else this.taps.put(position, null, this.page.scene.level, true);
+    else this.taps.put(position, null, this.page.scene.level);
   }
 
   moved() {
@@ -248,6 +254,7 @@ export class Wearer {
     if (value === 'map') return this.enter('go', true);
     this.enter(null);
     if (!value) return this.page.send('go_nowhere');
+    if (value === 'exit') return this.page.send('go_out');
     const [level, room] = value.split(' ').map(Number);
     $('goal').value = value;
     return this.go(this.page.plan.levels[level].rooms[room].at_m, level);

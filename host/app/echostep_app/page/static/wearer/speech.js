@@ -33,13 +33,13 @@ export class Speech {
     else if (this.last) this.say(this.last.text);
   }
 
-  // Take the guidance of a frame; the same sentence of the same time is not spoken again.
-  update(guidance) {
+  // Take the guidance of a frame; the same sentence of the same time is not spoken again. `isHeard`: the order to leave speaks it.
+  update(guidance, isHeard = false) {
     const now = guidance?.spoken ? { text: guidance.spoken, at_s: guidance.spoken_s, own: guidance.own } : null, { last } = this;
     if (now?.text === last?.text && now?.at_s === last?.at_s && now?.own === last?.own) return;
     this.last = now;
     this.region.textContent = tr(inUnits(now?.text ?? ''));
-    if (this.on) this.say(now?.text);
+    if (this.on && !isHeard) this.say(now?.text);
   }
 
   // The wearer's alarm is spoken whether speech is switched on or not; the same one again when its `times` changes.

@@ -27,10 +27,9 @@ export class Taps {
     this.desk.changed();
   }
 
-  // The finger is off: ask the server what it would do. `goes`: the place may also become the destination.
-  put([x_m, y_m], heading_rad, level, goes) {
+  // The finger is off: ask the server what it would do.
+  put([x_m, y_m], heading_rad, level) {
     this.ghost = { x_m, y_m, heading_rad, kept_rad: this.desk.keptHeading(), sd_m: this.sd, level };
-    $('sheet-go').hidden = !goes;
     $('sheet-here').hidden = !this.desk.mayCheckIn();
     $('sheet-here').disabled = true;
     this.said = '';
@@ -93,7 +92,7 @@ export class Taps {
   // After a new connection an answer may be lost: ask again.
   reconnected() {
     this.asked = 0;
-    if (this.ghost?.level !== undefined) this.put([this.ghost.x_m, this.ghost.y_m], this.ghost.heading_rad, this.ghost.level, !$('sheet-go').hidden);
+    if (this.ghost?.level !== undefined) this.put([this.ghost.x_m, this.ghost.y_m], this.ghost.heading_rad, this.ghost.level);
   }
 
   // The offer of a frame to undo the newest check-in, whichever page made it.

@@ -153,8 +153,10 @@ def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
         report.take_back(line.what)
     names: list[list[Written]] = []
     for line in sorted(lines, key=lambda one: (-one.room.at_m[1], one.room.at_m[0])):
-        above = [name for name in names if _follows(line, name[-1])]
-        (above[0] if above else names).append(line if above else [line])
+        above = next((name for name in names if _follows(line, name[-1])), None)
+        if above is None:
+            names.append(above := [])
+        above.append(line)
     return [Room(" ".join(line.room.name for line in name)[:80], name[0].room.at_m) for name in names]
 
 

@@ -209,7 +209,8 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         for level, gap in gaps.items():
             if gap is not None and gap not in lines[level]:
                 lines[level].add(gap)
-                name = (tags.get("name") or tags.get("ref") or "")[:80]
+                entrance = f"{tags['entrance']} entrance" if tags.get("entrance", "no") != "no" else ""
+                name = (tags.get("name") or tags.get("ref") or entrance)[:80]
                 site.drawn_levels[level].doors.append(Door(gap, _state(tags), name))
     if ground:
         report.doubt(f"doors without level on outlines are on the ground ({', '.join(ground[:5])}): tag level=*")
