@@ -180,9 +180,7 @@ def test_replay_score_and_foot_compare_with_the_recorded_truth(folder: Path, tmp
     assert made.returncode == 0, made.stderr
     on_plan = ("--plan", folder / "plan.json", "--start", START)
     tracked = run("replay", tmp_path / "walk.mcap", *on_plan, "--headless", "--out", tmp_path)
-    at_once = run(
-        "foot", folder / "imu.csv", *on_plan, "--truth", folder / f"{truth}.csv", "--out", tmp_path / "a/t.csv"
-    )
+    at_once = run("foot", folder / "imu.csv", *on_plan, "--truth", folder / f"{truth}.csv", "--out", tmp_path / "a")
     rmse = [re.findall(r"RMSE ([\d.]+) m", done.stdout) for done in (tracked, at_once)]
     assert rmse == [["0.30"], ["0.30"]], tracked.stdout + at_once.stdout + at_once.stderr
     scored = [

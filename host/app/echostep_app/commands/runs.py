@@ -22,6 +22,7 @@ from echostep_app.commands.options import (
     Port,
     RecordedSeed,
     Seed,
+    out_option,
     page_address,
 )
 from echostep_simulation.kits import Kit
@@ -92,9 +93,7 @@ def live(
 @with_groups
 def record(
     ports: Ports,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
-        "out/recording.mcap"
-    ),
+    out: Annotated[Path, out_option("FILE", "The recording to write.")] = Path("out/recording.mcap"),
 ) -> None:
     """Record the ports without tracking."""
     from echostep_app.session.runs import live as live_run

@@ -17,6 +17,7 @@ from typing import Any, Protocol, TypeVar
 from msgspec import UNSET
 
 from echostep.errors import EchostepError
+from echostep.file_mode import keep_earlier
 from echostep_app.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]  # the columns of a row by name: every summary row is one
@@ -116,4 +117,6 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> None:
     import pyarrow.parquet
 
     columns = dict.fromkeys(key for row in rows for key in row)
-    pyarrow.parquet.write_table(pyarrow.table({key: [row.get(key) for row in rows] for key in columns}), path)
+    pyarrow.parquet.write_table(
+        pyarrow.table({key: [row.get(key) for row in rows] for key in columns}), keep_earlier(path)
+    )
