@@ -99,22 +99,25 @@ def estimate_of(
     """Weighted moments of the tracked cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are by all clouds.
 
     The mean of a cloud with several likely places may lie in none of them: the position is then the likeliest place, if it has more than
-    half of the weight, and MUCH_LIKELIER times the weight near the mean. `sd_m`: standard deviation per axis to add. While tracking, the covariance
-    is the cloud's; otherwise that of the mixture with `elsewhere`, where the trunk is if all clouds are wrong, about the position. `map_sd_m`:
-    standard deviation per axis of the map itself there, as a drawing states it; it is part of `sd_m`, and makes small errors less likely.
-    `height`: mean and standard deviation (m), if not the cloud's.
+    half of the weight, and MUCH_LIKELIER times the weight near the mean. A place with more than SURE of the belief is alone: all else is elsewhere.
+    The 95 % ellipse of the covariance is the region of 95 % of the belief, as long as one place has more; below that, the covariance is that of the
+    mixture with `elsewhere`, where the trunk is if all clouds are wrong, about the position. `sd_m`: standard deviation per axis to add. `map_sd_m`:
+    of the map itself there, as a drawing states it; it is part of `sd_m`, and makes small errors less likely. `height`: mean and standard deviation
+    (m), if not the cloud's.
     """
     (cloud, right), *rivals = mixture
     weight, shares = cloud.weight, _shares(mixture)
     levels = tuple((shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
     z = float(weight @ cloud.z_m)
     height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
-    m = moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
+    m = region = _moments(cloud, weight, walk_heading_rad)
     places: tuple[LikelyPlace, ...] = ()
-    if rivals or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED:
-        places = _places(mixture, shares, walk_heading_rad)
-    if not rivals and places and places[0].probability > PROBABLE:
-        m = _moments_at(places[0], m, cloud, weight)
+    if rivals or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED or right <= SURE:
+        places = _places(mixture, walk_heading_rad)
+    share = 1.0
+    if not rivals and places and places[0].probability > PROBABLE * right:
+        m, region, share = _at_likeliest(places[0], m, cloud, walk_heading_rad, right)
+        places = () if right * share > SURE else places
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     limits_m = (TRACKING_M, LOST_M)
@@ -126,9 +129,12 @@ def estimate_of(
         near, about = near + probability * beside[0], about + probability * beside[1]
         right = min(right + probability * beside[0], 1.0)
     status = _status(near, about, max(levels))
-    xx, yy = xx + sd_m**2, yy + sd_m**2
-    protection_m = _protection_m(xx, xy, yy, right * max(levels))
-    if status is not TrackStatus.TRACKING and elsewhere is not None:
+    protection_m = _protection_m(xx + sd_m**2, xy, yy + sd_m**2, right * max(levels))
+    right *= share
+    xx, xy, yy = region.xx_m2 + sd_m**2, region.xy_m2, region.yy_m2 + sd_m**2
+    if right > SURE:
+        xx, xy, yy = (value * math.log(1.0 - SURE / right) / math.log(1.0 - SURE) for value in (xx, xy, yy))
+    elif elsewhere is not None:
         xx, xy, yy = elsewhere.mixed((x, y), (xx, xy, yy), right)
     return Estimate(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, *height,
@@ -142,26 +148,48 @@ def _shares(mixture: Mixture) -> Floats:
     return probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
 
 
-def _places(mixture: Mixture, shares: Floats, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
-    """The likely places of the trunk, if it is in one of the clouds."""
+def _places(mixture: Mixture, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:
+    """The likely places of the trunk."""
     each = [
-        (cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, share * cloud.weight)
-        for (cloud, _), share in zip(mixture, shares, strict=True)
+        (cloud.map_x_m, cloud.y_m, cloud.level, cloud.turn_rad + walk_heading_rad, probability * cloud.weight)
+        for cloud, probability in mixture
     ]
     return hypotheses(*map(np.concatenate, zip(*each, strict=True)))
 
 
-def _moments_at(place: LikelyPlace, mean: Moments, cloud: Particles, weight: Floats) -> Moments:
-    """The moments about a place, with its heading; the moments about the mean, if half as much weight is near the mean."""
+def _at_likeliest(
+    place: LikelyPlace, mean: Moments, cloud: Particles, walk_heading_rad: float, right: float
+) -> tuple[Moments, Moments, float]:
+    """Moments of a cloud about its likeliest place, those of the place's region, and its share of the cloud.
+
+    A place that is alone is all within LOST_M of it; of others the region is the whole cloud. The moments about the mean, and those, if half as
+    much weight is near the mean.
+    """
     distance_m = np.hypot(cloud.map_x_m - place.x_m, cloud.y_m - place.y_m)
-    near, about = (float(weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
+    inside = cloud.weight * ((cloud.level == place.level) & (distance_m < LOST_M))
+    share = float(inside.sum())
+    if right * share > SURE:
+        region = _moments(cloud, inside / share, walk_heading_rad)
+        near, about, east, north = share * region.near, share * region.about, region.east, region.north
+        return _about(mean, region.x_m, region.y_m, (east, north, near, about)), region, share
+    near, about = (float(cloud.weight[distance_m < limit_m].sum()) for limit_m in (TRACKING_M, LOST_M))
     if near < MUCH_LIKELIER * mean.near:
-        return mean
-    dx, dy = mean.x_m - place.x_m, mean.y_m - place.y_m
-    xx, xy, yy = mean.xx_m2 + dx * dx, mean.xy_m2 + dx * dy, mean.yy_m2 + dy * dy
+        return mean, mean, 1.0
     length = math.hypot(mean.east, mean.north)
     east, north = length * math.cos(place.heading_rad), length * math.sin(place.heading_rad)
-    return Moments(place.x_m, place.y_m, xx, xy, yy, east, north, near, about)
+    whole = _about(mean, place.x_m, place.y_m, (east, north, near, about))
+    return whole, whole, 1.0
+
+
+def _about(mean: Moments, x_m: float, y_m: float, rest: tuple[float, float, float, float]) -> Moments:
+    """The moments about another place than the mean, with the `rest`: mean unit vector and weights near there."""
+    dx, dy = mean.x_m - x_m, mean.y_m - y_m
+    return Moments(x_m, y_m, mean.xx_m2 + dx * dx, mean.xy_m2 + dx * dy, mean.yy_m2 + dy * dy, *rest)
+
+
+def _moments(cloud: Particles, weight: Floats, walk_heading_rad: float) -> Moments:
+    """Moments of a cloud with these weights (n,)."""
+    return moments(cloud.map_x_m, cloud.y_m, cloud.turn_rad + walk_heading_rad, weight, TRACKING_M, LOST_M)
 
 
 def _status(near: float, about: float, level: float) -> TrackStatus:
