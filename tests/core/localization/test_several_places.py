@@ -83,7 +83,8 @@ def test_the_likelier_place_is_claimed_beside_others() -> None:
 
 
 @pytest.mark.parametrize(
-    ("second", "sd_m", "here"), [(0.0, 0.1, 1.0), (0.0, 0.1, 0.99), (0.0, 1.2, 0.97), (0.03, 0.1, 0.99), (0.01, 0.8, 0.97)]
+    ("second", "sd_m", "here"),
+    [(0.0, 0.1, 1.0), (0.0, 0.1, 0.99), (0.0, 1.2, 0.97), (0.03, 0.1, 0.99), (0.01, 0.8, 0.97)],
 )
 def test_the_region_of_95_percent_holds_95_percent_of_the_belief(second: float, sd_m: float, here: float) -> None:
     """Of all places that the belief gives: about the origin, at the second one, and elsewhere."""

@@ -117,7 +117,7 @@ def estimate_of(
     share = 1.0
     if not rivals and places and places[0].probability > PROBABLE * right:
         m, region, share = _at_likeliest(places[0], m, cloud, walk_heading_rad, right)
-        places = () if right * share > SURE else places
+        places = places if region is m else ()
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     limits_m = (TRACKING_M, LOST_M)
