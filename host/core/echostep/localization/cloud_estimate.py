@@ -117,7 +117,6 @@ def estimate_of(
     share = 1.0
     if not rivals and places and places[0].probability > PROBABLE * right:
         m, region, share = _at_likeliest(places[0], m, cloud, walk_heading_rad, right)
-        places = places if region is m else ()
     x, y, xx, xy, yy, east, north, near, about = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     limits_m = (TRACKING_M, LOST_M)
@@ -131,6 +130,8 @@ def estimate_of(
     status = _status(near, about, max(levels))
     protection_m = _protection_m(xx + sd_m**2, xy, yy + sd_m**2, right * max(levels))
     right *= share
+    if region is not m or (places and places[0].probability > SURE):
+        places = ()
     xx, xy, yy = region.xx_m2 + sd_m**2, region.xy_m2, region.yy_m2 + sd_m**2
     if right > SURE:
         xx, xy, yy = (value * math.log(1.0 - SURE / right) / math.log(1.0 - SURE) for value in (xx, xy, yy))

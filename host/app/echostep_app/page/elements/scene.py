@@ -6,13 +6,14 @@ In: a tracker, in the tracker's thread. Out: `PageScene`s that any thread may re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Octets
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.particles.limits import PROBABLE
 from echostep.plan import Plan
 from echostep.tracker.state import ParticleSnapshot
@@ -98,12 +99,24 @@ def status_text(
         return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
     if estimate.plan_fits < PROBABLE:
         return "this plan does not fit: is it another building or floor, or mirrored?"
-    if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
-        return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
+    if estimate.status != TrackStatus.TRACKING and estimate.hypotheses and not estimate.is_one_place:
+        return f"{estimate.status.value}: {fitting(estimate.hypotheses)}; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST and not no_plan:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
     where = ", outside the building" if estimate.outside > PROBABLE else _height_words(estimate.z_m) if no_plan else ""
-    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
+    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}{elsewhere(estimate)}"
+
+
+def fitting(places: Sequence[LikelyPlace]) -> str:
+    """The number of places that fit, and their share of the belief."""
+    share = f"{100.0 * sum(place.probability for place in places):.0f} % in all"
+    return f"1 place fits, {share}" if len(places) == 1 else f"{len(places)} places fit, {share}"
+
+
+def elsewhere(estimate: Estimate) -> str:
+    """The share of the belief that is not at the position's place, where the position is not sure."""
+    share = round(100.0 * (1.0 - estimate.right))
+    return f", {share} % elsewhere" if share and estimate.status is TrackStatus.UNCERTAIN else ""
 
 
 def _height_words(z_m: float) -> str:
