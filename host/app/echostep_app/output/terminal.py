@@ -28,9 +28,8 @@ from echostep.localization import Estimate
 from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Finding, Severity, all_findings
-from echostep_app.page.elements.scene import elsewhere, fitting
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.wearer.steady_status import SteadyStatus, running_note
+from echostep_app.wearer.steady_status import SteadyStatus, elsewhere, fitting, running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time

@@ -3,14 +3,15 @@
 
 In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
 The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
-`running_note`: a few words after the status while the foot rests too briefly for a walk.
+`running_note`, `fitting`, `elsewhere`: words after the status: of a run, of places that fit, of what is not at the position's place.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
@@ -45,3 +46,15 @@ def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
     if not estimate.claims_place:
         return "running"
     return f"running: position good to about {estimate.ellipse95.major_m:.1f} m"
+
+
+def fitting(places: Sequence[LikelyPlace]) -> str:
+    """The number of places that fit, and their share of the belief."""
+    share = f"{100.0 * sum(place.probability for place in places):.0f} % in all"
+    return f"1 place fits, {share}" if len(places) == 1 else f"{len(places)} places fit, {share}"
+
+
+def elsewhere(estimate: Estimate) -> str:
+    """The share of the belief that is not at the position's place, where the position is not sure."""
+    share = round(100.0 * (1.0 - estimate.right))
+    return f", {share} % elsewhere" if share and estimate.status is TrackStatus.UNCERTAIN else ""

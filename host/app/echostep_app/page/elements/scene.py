@@ -6,14 +6,13 @@ In: a tracker, in the tracker's thread. Out: `PageScene`s that any thread may re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Floats, Octets
-from echostep.localization import Estimate, LikelyPlace, TrackStatus
+from echostep.localization import Estimate, TrackStatus
 from echostep.particles.limits import PROBABLE
 from echostep.plan import Plan
 from echostep.tracker.state import ParticleSnapshot
@@ -24,6 +23,7 @@ from echostep_app.page.elements.marks import BeaconMark, ShownMeeting
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.scorecard.track_columns import ScoredPath
+from echostep_app.wearer.steady_status import elsewhere, fitting
 
 MOST_SHOWN = 10_000  # particles in a frame
 
@@ -105,18 +105,6 @@ def status_text(
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
     where = ", outside the building" if estimate.outside > PROBABLE else _height_words(estimate.z_m) if no_plan else ""
     return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}{elsewhere(estimate)}"
-
-
-def fitting(places: Sequence[LikelyPlace]) -> str:
-    """The number of places that fit, and their share of the belief."""
-    share = f"{100.0 * sum(place.probability for place in places):.0f} % in all"
-    return f"1 place fits, {share}" if len(places) == 1 else f"{len(places)} places fit, {share}"
-
-
-def elsewhere(estimate: Estimate) -> str:
-    """The share of the belief that is not at the position's place, where the position is not sure."""
-    share = round(100.0 * (1.0 - estimate.right))
-    return f", {share} % elsewhere" if share and estimate.status is TrackStatus.UNCERTAIN else ""
 
 
 def _height_words(z_m: float) -> str:
