@@ -213,6 +213,8 @@ def test_replay_score_and_foot_compare_with_the_recorded_truth(folder: Path, tmp
         )
     ]
     assert scored == pytest.approx([0.3, 0.3], abs=0.002)
+    told = run("score", tmp_path / "walk.mcap", "--plan", folder / "plan.json").stdout
+    assert told.startswith("No start is known, so the walk is sought anywhere")
     bare, walk = (
         echostep.replay(each, folder / "plan.json", start=Pose(1.0, 2.0, np.pi / 2))
         for each in (folder / "bare.mcap", tmp_path / "walk.mcap")
