@@ -44,6 +44,8 @@ BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
 LEFT = "the board's port was closed: its next opening begins the walk anew"
 LATE_S = 0.5  # a delay behind real time that is reported
+PARTS = {name: name for name in ("thigh", "calf", "belt", "compass")}  # of the papers' kit, by the twin's names
+PARTS |= {"left": "srf_left", "right": "srf_right", "barometer": "scp1000"}
 CALIBRATION = "out/twin/calibration.toml"
 
 
@@ -193,6 +195,14 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         yield now_s
 
 
+def leave_out(board: PtyBoard, names: str) -> None:
+    """Fit the board without these parts. Raises EchostepError for others."""
+    for name in filter(None, names.split(",")):
+        if name not in PARTS:
+            raise EchostepError(f"--without {name}: expected some of {','.join(PARTS)}")
+        board.fault(f"{PARTS[name]}=absent")
+
+
 def announce(command: str, **ports: str) -> None:
     """Print the ports, and what to start in another terminal."""
     for name, port in ports.items():
@@ -205,6 +215,7 @@ def walk_with_mtx(options: argparse.Namespace) -> None:
     truth = options.out / "truth.csv"
     more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
     with contextlib.closing(PtyBoard()) as board:
+        leave_out(board, options.without)
         mtx = PtyMtx()
         announce(f"live --plan {PLAN} --board {board.port} --mtx {mtx.port}{more}", board=board.port, mtx=mtx.port)
         while True:
@@ -306,6 +317,7 @@ def main() -> int:
         "--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: a foot board too"
     )
     parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
+    parser.add_argument("--without", default="", metavar="PARTS", help="parts that are not wired yet, as left,thigh")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     plays = (walk_with_two_boards, turn_boxes) if options.kit == Kit.OF_2026.value else (walk_with_mtx, rehearse)

@@ -46,6 +46,7 @@ INSTEAD: dict[str, str] = {
     "evaluate gaits": "evaluate legs has its rows: --rows 'foot/*' and 'legs/*'",
     "evaluate lee2010": "evaluate legs has its rows: --rows 'lap/*', 'storeys*' and floors",
     "evaluate trails": "evaluate noplan has its rows: --rows 'trail/*'",
+    "plan edit --headless": "--no-open",
     "[ranger] learn": LEARNT_BIAS,
     "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
     "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep_app.commands.options import Lang, out_option, picture_option
+from echostep_app.commands.options import Browser, Lang, out_option, picture_option
 from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import say
 
@@ -224,14 +224,14 @@ def edit(
     port: Annotated[
         int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)
     ] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
+    browser: Browser = True,
     lang: Lang = None,
 ) -> None:
     """Clean a plan, draw walls and doors, name rooms on a page in the browser, until Ctrl-C."""
     require("the plan editor", *PAGE)
     from echostep_app.page.editor import edit_plan
 
-    edit_plan(file, picture, port, lang.value if lang else None, browser=not headless)
+    edit_plan(file, picture, port, lang.value if lang else None, browser=browser)
 
 
 def _level(plan: Plan, name: str) -> int:

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Plan, RecordedSeed, SettingsFile, out_option
+from echostep_app.commands.options import OptionalPlan, RecordedSeed, SettingsFile, out_option
 from echostep_app.printing.lines import say
 from echostep_app.printing.people import outlast_output
 
@@ -50,11 +50,11 @@ def cut(
 @app.command()
 def export(
     file: Recording,
-    plan: Plan,
     out: Annotated[
         Path,
-        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, or .mcap with derived messages."),
+        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, .geojson, .tum, or .mcap with derived messages."),
     ],
+    plan: OptionalPlan = None,
     start: Annotated[
         str | None, typer.Option("--start", metavar="X,Y,DEG", help="Position and heading of the wearer at the start.")
     ] = None,

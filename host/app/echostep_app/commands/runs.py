@@ -115,11 +115,14 @@ def replay(
     truth: Annotated[
         Path | None, typer.Option("--truth", metavar="FILE", help="True path to compare with (CSV).")
     ] = None,
+    browser: Browser = True,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
+    from echostep_app.commands.actions.foreign import refuse_foreign
     from echostep_app.session.runs import replay as replay_run
 
-    outputs = output.options(out, stays_on_terminal=True)
+    refuse_foreign(recording)
+    outputs = output.options(out, stays_on_terminal=True, browser=browser)
     replay_run.replay(recording, tracking.options(seed), truth, outputs)
 
 
