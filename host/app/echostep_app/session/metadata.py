@@ -133,7 +133,7 @@ def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:
 
 
 def _room(name: str, plan: Plan) -> Start | None:
-    """Anywhere in the room of this name, or the only one whose name begins so: in its outline, or within ROOM_M of its label; None for no such room."""
+    """Anywhere in the room of this name, or the only one that begins so: in its outline, or within ROOM_M of its label; None for none."""
     rooms = [(k, room) for k, level in enumerate(plan.levels) for room in level.rooms]
     same = [each for each in rooms if each[1].name.casefold() == name.casefold()]
     begin = [each for each in rooms if each[1].name.casefold().startswith(name.casefold())]
