@@ -34,24 +34,9 @@ def replaced(begin: bytes) -> str:
     return f"packed by {packed}: unpack it first" if packed else ""
 
 
-LEARNT_BIAS = "the range bias that both rangers have in common is learnt while tracking"
-# A command (`acceptance`), its option (`map --plan`), a setting (`[ranger] learn`), the begin of an address in any command (`mesh://`),
-# an option with such a value (`--plan wearer:`)
-INSTEAD: dict[str, str] = {
-    "acceptance": "live records a walk with the places that are tapped on its page, and score WALK.mcap --taps compares it with them",
-    "calibrate --mtx": LEARNT_BIAS,
-    "calibrate --plan": LEARNT_BIAS,
-    "calibrate rangers": LEARNT_BIAS,
+INSTEAD: dict[str, str] = {  # of settings
     "[cloud] start_veer_sd_deg": "feet do not veer, and a robot's wheels are calibrated before its path is tracked",
-    "evaluate gaits": "evaluate legs has its rows: --rows 'foot/*' and 'legs/*'",
-    "evaluate lee2010": "evaluate legs has its rows: --rows 'lap/*', 'storeys*' and floors",
-    "evaluate trails": "evaluate noplan has its rows: --rows 'trail/*'",
-    "plan edit --headless": "--no-open",
-    "[ranger] learn": LEARNT_BIAS,
-    "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
-    "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",
-    "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
-    "score --html": "score prints the numbers, and evo draws the track that export writes as .tum",
+    "[ranger] learn": "the range bias that both rangers have in common is learnt while tracking",
 }
 
 

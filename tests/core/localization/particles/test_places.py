@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.angles import mean_angle
-from echostep.localization.cloud_estimate import moments, weight_about
+from echostep.localization.cloud_estimate import weight_about
 from echostep.localization.particles import places as module
 from echostep.localization.particles.places import hypotheses
 from echostep.particles.limits import HALF_STOREY_M
@@ -36,22 +35,6 @@ def test_a_cloud_that_spans_a_country_needs_no_more_memory(monkeypatch: pytest.M
     x, y = np.array([0.0, 0.5, 4e5]), np.array([0.0, 0.0, -4e5])
     found = hypotheses(x, y, np.zeros(3, np.int64), np.zeros(3), np.array([0.3, 0.3, 0.4]))
     assert [(h.probability, h.x_m) for h in found] == [pytest.approx((0.6, 0.25)), pytest.approx((0.4, 4e5))]
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 300))
-def test_moments_are_those_of_numpy(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    x, y, heading, weight = rng.normal(50.0, 2.0, count), rng.normal(-9.0, 3.0, count), *rng.random((2, count))
-    weight /= weight.sum()
-    m = moments(x, y, heading, weight, 1.0, 5.0)
-    away = np.hypot(x - weight @ x, y - weight @ y)
-    covariance = np.cov(np.vstack([x, y]), aweights=weight, bias=True) if count > 1 else np.zeros((2, 2))
-    assert (m.x_m, m.y_m) == pytest.approx((weight @ x, weight @ y))
-    assert (m.xx_m2, m.xy_m2, m.yy_m2) == pytest.approx(
-        [covariance[0, 0], covariance[0, 1], covariance[1, 1]], abs=1e-9
-    )
-    assert np.arctan2(m.north, m.east) == pytest.approx(mean_angle(heading, weight))
-    assert (m.near, m.about) == pytest.approx((weight @ (away < 1.0), weight @ (away < 5.0)))
 
 
 def test_weight_about_a_place_is_of_its_level() -> None:
