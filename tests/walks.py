@@ -12,6 +12,7 @@ import numpy as np
 
 from board_runs import ROOT
 from echostep.arrays import Floats
+from echostep.foot.steps import FootCounts, Step, Track
 from echostep.localization import Estimate
 from echostep.particles.ellipse import in_ellipse95
 from echostep.plan import load_plan
@@ -20,6 +21,7 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
+WALK = ROOT / "tests/captures/walk.mcap"
 
 
 @cache
@@ -49,3 +51,11 @@ def errors_of(estimates: Sequence[Estimate], scenario: Scenario) -> Errors:
     )
     covariance_m2 = np.array([(e.xx_m2, e.xy_m2, e.yy_m2) for e in within])
     return Errors(np.hypot(*error_m.T), float(in_ellipse95(error_m, covariance_m2).mean()))
+
+
+def foot_track() -> Track:
+    """One step ahead."""
+    t_s, ahead_m = np.arange(4.0), np.array([0.0, 0.0, 0.7, 0.7])
+    step = Step(1.0, 2.0, (0.7, 0.0, 0.0), np.eye(3), 0.0, 0.0)
+    position_m, stance = np.column_stack([ahead_m, 0 * ahead_m, 0 * ahead_m]), np.array([True, True, False, True])
+    return Track(t_s, position_m, 0 * t_s, stance, [step], FootCounts(4, 0, 0, 0, 0, 0))

@@ -44,8 +44,7 @@ BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
 LEFT = "the board's port was closed: its next opening begins the walk anew"
 LATE_S = 0.5  # a delay behind real time that is reported
-PARTS = {name: name for name in ("thigh", "calf", "belt", "compass")}  # of the papers' kit, by the twin's names
-PARTS |= {"left": "srf_left", "right": "srf_right", "barometer": "scp1000"}
+SIDES = {"left": "srf_left", "right": "srf_right"}  # by the twin's names
 CALIBRATION = "out/twin/calibration.toml"
 
 
@@ -195,14 +194,6 @@ def playing(scenario: Scenario, board: PtyBoard, mtx: PtyMtx) -> Iterator[float]
         yield now_s
 
 
-def leave_out(board: PtyBoard, names: str) -> None:
-    """Fit the board without these parts. Raises EchostepError for others."""
-    for name in filter(None, names.split(",")):
-        if name not in PARTS:
-            raise EchostepError(f"--without {name}: expected some of {','.join(PARTS)}")
-        board.fault(f"{PARTS[name]}=absent")
-
-
 def announce(command: str, **ports: str) -> None:
     """Print the ports, and what to start in another terminal."""
     for name, port in ports.items():
@@ -215,7 +206,8 @@ def walk_with_mtx(options: argparse.Namespace) -> None:
     truth = options.out / "truth.csv"
     more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
     with contextlib.closing(PtyBoard()) as board:
-        leave_out(board, options.without)
+        for name in filter(None, options.without.split(",")):
+            board.fault(f"{SIDES.get(name, name)}=absent")
         mtx = PtyMtx()
         announce(f"live --plan {PLAN} --board {board.port} --mtx {mtx.port}{more}", board=board.port, mtx=mtx.port)
         while True:

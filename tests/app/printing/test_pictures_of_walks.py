@@ -15,30 +15,18 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Ellipse
 
 import echostep
-from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.foot.steps import FootCounts, Step, Track
 from echostep.localization import LikelyPlace, TrackStatus
 from echostep.plan import load_plan
 from echostep_app.output.track_plot import WORDS, track_figure
 from echostep_app.printing.picture_files import ENDINGS
-from walks import DEMO
-
-WALK = ROOT / "tests/captures/walk.mcap"
+from walks import DEMO, WALK, foot_track
 
 
 @pytest.fixture(scope="module")
 def walk() -> echostep.Walk:
     """The recorded walk on its plan."""
     return echostep.replay(WALK, DEMO)
-
-
-def foot_track() -> Track:
-    """One step ahead."""
-    t_s, ahead_m = np.arange(4.0), np.array([0.0, 0.0, 0.7, 0.7])
-    step = Step(1.0, 2.0, (0.7, 0.0, 0.0), np.eye(3), 0.0, 0.0)
-    position_m, stance = np.column_stack([ahead_m, 0 * ahead_m, 0 * ahead_m]), np.array([True, True, False, True])
-    return Track(t_s, position_m, 0 * t_s, stance, [step], FootCounts(4, 0, 0, 0, 0, 0))
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

@@ -11,29 +11,18 @@ import numpy as np
 import pytest
 
 import echostep
-from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.foot.steps import FootCounts, Step, Track
 from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep.walk.table import write_track
-from walks import DEMO
+from walks import DEMO, WALK, foot_track
 
 pytestmark = pytest.mark.slow
-WALK = ROOT / "tests/captures/walk.mcap"
 
 
 @pytest.fixture(scope="module")
 def walk() -> echostep.Walk:
     """The recorded walk on its plan."""
     return echostep.replay(WALK, DEMO)
-
-
-def foot_track() -> Track:
-    """One step ahead."""
-    t_s, ahead_m = np.arange(4.0), np.array([0.0, 0.0, 0.7, 0.7])
-    step = Step(1.0, 2.0, (0.7, 0.0, 0.0), np.eye(3), 0.0, 0.0)
-    position_m, stance = np.column_stack([ahead_m, 0 * ahead_m, 0 * ahead_m]), np.array([True, True, False, True])
-    return Track(t_s, position_m, 0 * t_s, stance, [step], FootCounts(4, 0, 0, 0, 0, 0))
 
 
 def test_a_table_holds_what_track_csv_does(walk: echostep.Walk, tmp_path: Path) -> None:

@@ -50,8 +50,8 @@ def running_note(segment: PathSegment | None, estimate: Estimate | None) -> str:
 
 def fitting(places: Sequence[LikelyPlace]) -> str:
     """The number of places that fit, and their share of the belief."""
-    share = f"{100.0 * sum(place.probability for place in places):.0f} % in all"
-    return f"1 place fits, {share}" if len(places) == 1 else f"{len(places)} places fit, {share}"
+    count, share = len(places), sum(place.probability for place in places)
+    return f"{count} {'place fits' if count == 1 else 'places fit'}, {100.0 * share:.0f} % in all"
 
 
 def elsewhere(estimate: Estimate) -> str:
