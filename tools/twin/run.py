@@ -44,7 +44,6 @@ BLOCK_MS, IDLE_MS = 10, 50
 FOOT_BOARD = 2  # seed of the one on the foot
 LEFT = "the board's port was closed: its next opening begins the walk anew"
 LATE_S = 0.5  # a delay behind real time that is reported
-SIDES = {"left": "srf_left", "right": "srf_right"}  # by the twin's names
 CALIBRATION = "out/twin/calibration.toml"
 
 
@@ -207,7 +206,7 @@ def walk_with_mtx(options: argparse.Namespace) -> None:
     more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
     with contextlib.closing(PtyBoard()) as board:
         for name in filter(None, options.without.split(",")):
-            board.fault(f"{SIDES.get(name, name)}=absent")
+            board.fault(f"{'srf_' * (name in ('left', 'right'))}{name}=absent")
         mtx = PtyMtx()
         announce(f"live --plan {PLAN} --board {board.port} --mtx {mtx.port}{more}", board=board.port, mtx=mtx.port)
         while True:
@@ -305,9 +304,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=OUT / "twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
-    parser.add_argument(
-        "--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: a foot board too"
-    )
+    parser.add_argument("--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: two boards")
     parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
     parser.add_argument("--without", default="", metavar="PARTS", help="parts that are not wired yet, as left,thigh")
     options = parser.parse_args()

@@ -115,5 +115,5 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> None:
     import pyarrow.parquet
 
     columns = dict.fromkeys(key for row in rows for key in row)
-    table = pyarrow.table({key: [row.get(key) for row in rows] for key in columns})
-    pyarrow.parquet.write_table(table, keep_earlier(path))
+    table = {key: [row.get(key) for row in rows] for key in columns}
+    pyarrow.parquet.write_table(pyarrow.table(table), keep_earlier(path))
