@@ -18,6 +18,7 @@ from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.particles.ellipse import CHI2_95, ellipse95
 from echostep.particles.limits import BELIEVED, HALF_STOREY_M, LOST_M, PROBABLE, RISK, SURE, TRACKING_M
+from echostep.plan import Pose
 
 # Times the weight near the mean of a cloud of several places, with which the likeliest of them is its position, assumed
 MUCH_LIKELIER = 2.0
@@ -47,18 +48,14 @@ def moments(cloud: Particles, weight: Floats, walk_heading_rad: float) -> Moment
     return Moments(x, y, xx, xy, yy, east, north)
 
 
-def weight_about(
-    x_m: Floats, y_m: Floats, z_m: Floats, weight: Floats, place_m: tuple[float, float, float], limit_m: tuple[float, float],
-    map_sd_m: float = 0.0,
-) -> tuple[float, float]:  # fmt: skip
-    """Weight of the particles (n,) within each of two distances of a place in the map, and within HALF_STOREY_M of its height.
+def weight_about(cloud: Particles, at: Moments | Pose, z_m: float, map_sd_m: float = 0.0) -> tuple[float, float]:
+    """Weight of a cloud within TRACKING_M and within LOST_M of a place in the map, and within HALF_STOREY_M of its height.
 
     `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than the
     rest of the limit: a lower bound for the sum of both errors.
     """
-    here = weight * (np.abs(z_m - place_m[2]) < HALF_STOREY_M)
-    distance_m = np.hypot(x_m - place_m[0], y_m - place_m[1])
-    near, about = (float(here @ _within(limit - distance_m, map_sd_m)) for limit in limit_m)
+    here = cloud.weight * (np.abs(cloud.z_m - z_m) < HALF_STOREY_M)
+    near, about = (float(here @ _within(limit - _away_m(cloud, at), map_sd_m)) for limit in (TRACKING_M, LOST_M))
     return near, about
 
 
@@ -99,11 +96,10 @@ def estimate_of(
         m, region, share = _at_likeliest(places[0], m, cloud, walk_heading_rad, right)
     x, y, xx, xy, yy, east, north = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
-    limits_m = (TRACKING_M, LOST_M)
-    flat = np.zeros(len(weight))  # levels are asked for by themselves
-    near, about = weight_about(cloud.map_x_m, cloud.y_m, flat, right * weight, (x, y, 0.0), limits_m, map_sd_m)
+    away_m = _away_m(cloud, m)
+    near, about = (right * float(weight @ _within(limit - away_m, map_sd_m)) for limit in (TRACKING_M, LOST_M))
     for each, probability in rivals:
-        beside = weight_about(each.map_x_m, each.y_m, each.z_m, each.weight, (x, y, z), limits_m, map_sd_m)
+        beside = weight_about(each, m, z, map_sd_m)
         near, about = near + probability * beside[0], about + probability * beside[1]
         right = min(right + probability * beside[0], 1.0)
     status = _status(near, about, max(levels))
@@ -159,7 +155,7 @@ def _at_likeliest(
     return whole, whole, 1.0
 
 
-def _away_m(cloud: Particles, at: LikelyPlace | Moments) -> Floats:
+def _away_m(cloud: Particles, at: LikelyPlace | Moments | Pose) -> Floats:
     """Distance (n,) of the particles from a place."""
     return np.asarray(np.hypot(cloud.map_x_m - at.x_m, cloud.y_m - at.y_m))
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Places and moments of a cloud: the compiled passes against plain numpy."""
+"""Places of a cloud: the compiled pass against plain numpy."""
 
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from echostep.localization.cloud_estimate import weight_about
 from echostep.localization.particles import places as module
 from echostep.localization.particles.places import hypotheses
 from echostep.particles.limits import HALF_STOREY_M
+from echostep.plan import Pose
 from naive.places import places
 
 
@@ -38,9 +41,6 @@ def test_a_cloud_that_spans_a_country_needs_no_more_memory(monkeypatch: pytest.M
 
 
 def test_weight_about_a_place_is_of_its_level() -> None:
-    x, z, weight = (
-        np.array([0.0, 2.0, 0.0, 9.0]),
-        np.array([0.0, 0.0, HALF_STOREY_M, 0.0]),
-        np.array([0.1, 0.2, 0.3, 0.4]),
-    )
-    assert weight_about(x, np.zeros(4), z, weight, (0.0, 0.0, 0.0), (1.0, 5.0)) == pytest.approx((0.1, 0.3))
+    x, z = np.array([0.0, 2.0, 0.0, 9.0]), np.array([0.0, 0.0, HALF_STOREY_M, 0.0])
+    cloud: Any = SimpleNamespace(map_x_m=x, y_m=np.zeros(4), z_m=z, weight=np.array([0.1, 0.2, 0.3, 0.4]))
+    assert weight_about(cloud, Pose(0.0, 0.0, 0.0), 0.0) == pytest.approx((0.1, 0.3))
