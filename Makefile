@@ -38,11 +38,11 @@ firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put i
 	$(MAKE) -C firmware
 	cp firmware/build/echostep.hex firmware/build/echostep.hex.sha256 $(dir $(SHIPPED))
 
-twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks; KIT=2026: two boards
+twin: $(READY) ## play board and MTx on two pseudo terminals until Ctrl-C; STILL=1: a wearer who does what calibrate asks; KIT=2026: two boards; WITHOUT=left,thigh: parts left out
 	@tools/apt.sh $(APT_PACKAGES)
 	$(MAKE) -C firmware
 	$(MAKE) -C tools/twin
-	$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT))
+	$(TOOL) twin.run $(if $(STILL),--still) $(if $(KIT),--kit $(KIT)) $(if $(WITHOUT),--without $(WITHOUT))
 
 demo: $(DEMO_READY) ## track a simulated walk through the real firmware in the simulator; KIT=2026: with the parts of 2026 (default: papers)
 	@if tools/apt.sh $(APT_PACKAGES); then \

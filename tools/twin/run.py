@@ -205,6 +205,8 @@ def walk_with_mtx(options: argparse.Namespace) -> None:
     truth = options.out / "truth.csv"
     more = f" --beacons {options.beacons} --guide Meeting" if options.beacons else ""
     with contextlib.closing(PtyBoard()) as board:
+        for name in filter(None, options.without.split(",")):
+            board.fault(f"{'srf_' * (name in ('left', 'right'))}{name}=absent")
         mtx = PtyMtx()
         announce(f"live --plan {PLAN} --board {board.port} --mtx {mtx.port}{more}", board=board.port, mtx=mtx.port)
         while True:
@@ -302,10 +304,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=OUT / "twin", metavar="DIR")
     parser.add_argument("--beacons", metavar="PORT", help="play a beacon gateway to this port, in step with the walk")
-    parser.add_argument(
-        "--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: a foot board too"
-    )
+    parser.add_argument("--kit", choices=[kit.value for kit in Kit], default=Kit.PAPERS.value, help="2026: two boards")
     parser.add_argument("--still", action="store_true", help="a wearer who does what echostep calibrate asks")
+    parser.add_argument("--without", default="", metavar="PARTS", help="parts that are not wired yet, as left,thigh")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     plays = (walk_with_two_boards, turn_boxes) if options.kit == Kit.OF_2026.value else (walk_with_mtx, rehearse)

@@ -13,9 +13,9 @@ from echostep.plan import Plan
 from echostep.walk.walk import Walk
 from echostep_app.extras import lacks, require
 from echostep_app.output.offline_plots import foot_figure
-from echostep_app.output.track_plot import track_figure
+from echostep_app.output.track_plot import draw_track, track_figure
 from echostep_app.plan.pictures.drawing import plan_svg
-from echostep_app.printing.picture_files import save_picture, svg_text
+from echostep_app.printing.picture_files import svg_text
 
 
 def svg(shown: Plan | Track | Walk) -> str | None:
@@ -26,10 +26,11 @@ def svg(shown: Plan | Track | Walk) -> str | None:
         return plan_svg(shown)
     if isinstance(shown, Track):
         return svg_text(foot_figure(shown, "foot"))
-    return svg_text(track_figure(shown.plan, shown.estimates, None, shown.name))
+    with track_figure(shown.plan, shown.estimates, None, shown.name) as figure:
+        return svg_text(figure)
 
 
 def save(walk: Walk, path: Path) -> None:
     """The picture of a walk as PNG, SVG or PDF, by the ending of the name; raises EchostepError."""
     require("a picture", "matplotlib")
-    save_picture(track_figure(walk.plan, walk.estimates, None, walk.name), path)
+    draw_track(path, walk.plan, walk.estimates, None, walk.name)

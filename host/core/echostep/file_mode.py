@@ -10,6 +10,7 @@ read, are written meanwhile.
 from __future__ import annotations
 
 import os
+from itertools import count
 from pathlib import Path
 
 PRIVATE, SHARED = 0o600, 0o666  # of a new file; the umask may take away more
@@ -27,6 +28,15 @@ def file_mode() -> int:
 
 
 def claim(path: Path) -> Path:
-    """Make the file if missing, so that its mode is right before it has content; an existing file keeps its mode. Returns the path."""
+    """Make an empty file, so that its mode is right before it has content; one that had the name is kept (`keep_earlier`). Returns the path."""
+    keep_earlier(path)
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT, file_mode()))
+    return path
+
+
+def keep_earlier(path: Path) -> Path:
+    """Rename the file with content that has this name, as `track-0001.csv`: no result is overwritten. Returns the path. Raises OSError."""
+    if path.is_file() and path.stat().st_size:
+        names = (path.with_stem(f"{path.stem}-{number:04}") for number in count(1))
+        path.rename(next(name for name in names if not os.path.lexists(name)))
     return path

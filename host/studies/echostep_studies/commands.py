@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 import typer.core
 
+from echostep_app.commands.options import out_option
+
 if TYPE_CHECKING:
     from echostep_studies.frame.study import Study, StudyRequest
 
@@ -50,6 +52,7 @@ def _option(
     name: str, kind: Any, default: Any, words: str, metavar: str | None = None, least: int | None = None
 ) -> Parameter:
     declared = typer.Option(f"--{name.replace('_', '-')}", help=words, metavar=metavar, min=least)
+    declared = out_option("DIR", words) if name == "out" else declared
     return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, declared])
 
 

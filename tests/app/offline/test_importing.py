@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
+from itertools import starmap
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,10 @@ import echostep
 from command_line import echostep as run
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.foot.steps import walk_track
 from echostep.localization import Estimate, digest
 from echostep.offline.imu_csv import Imu
-from echostep.plan import Pose, load_plan
+from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep.ports.chunks import MTX
 from echostep.recording import open_recording
 from echostep.xsens import MtxReader
@@ -153,6 +156,25 @@ def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_pat
         tracker.feed_samples(walk.t_s, walk.accel[:, :2], walk.gyro)
 
 
+@pytest.mark.parametrize(("spoilt", "words"), [
+    (lambda t_s, accel, gyro: (t_s, accel / 9.80665, gyro), "look like g .* multiply them by 9.80665"),
+    (lambda t_s, accel, gyro: (t_s, accel, np.degrees(gyro)), "multiply them by pi/180"),
+    (lambda t_s, accel, gyro: (1e3 * t_s, accel, gyro), "in milliseconds. divide it by 1000"),
+    (lambda t_s, accel, gyro: (t_s[::-1], accel, gyro), "t_s goes back in 100 %"),
+])  # fmt: skip
+def test_arrays_in_other_units_or_order_are_refused(
+    walk: Imu, spoilt: Callable[..., tuple[Floats, Floats, Floats]], words: str
+) -> None:
+    """By the words and rules for files; portions of a few samples, too."""
+    samples = spoilt(walk.t_s, walk.accel, walk.gyro)
+    with pytest.raises(EchostepError, match=words):
+        walk_track(*samples)
+    tracker = echostep.Tracker(NO_PLAN, None, echostep.Settings.of_imu(100.0))
+    portions = (tuple(each[k : k + 7] for each in samples) for k in range(0, len(walk.t_s), 7))
+    with pytest.raises(EchostepError, match=words):
+        list(starmap(tracker.feed_samples, portions))
+
+
 BEGIN_S = 7.0  # of the file's times
 START = "1,2,90"
 
@@ -180,9 +202,7 @@ def test_replay_score_and_foot_compare_with_the_recorded_truth(folder: Path, tmp
     assert made.returncode == 0, made.stderr
     on_plan = ("--plan", folder / "plan.json", "--start", START)
     tracked = run("replay", tmp_path / "walk.mcap", *on_plan, "--headless", "--out", tmp_path)
-    at_once = run(
-        "foot", folder / "imu.csv", *on_plan, "--truth", folder / f"{truth}.csv", "--out", tmp_path / "a/t.csv"
-    )
+    at_once = run("foot", folder / "imu.csv", *on_plan, "--truth", folder / f"{truth}.csv", "--out", tmp_path / "a")
     rmse = [re.findall(r"RMSE ([\d.]+) m", done.stdout) for done in (tracked, at_once)]
     assert rmse == [["0.30"], ["0.30"]], tracked.stdout + at_once.stdout + at_once.stderr
     scored = [
@@ -193,6 +213,8 @@ def test_replay_score_and_foot_compare_with_the_recorded_truth(folder: Path, tmp
         )
     ]
     assert scored == pytest.approx([0.3, 0.3], abs=0.002)
+    told = run("score", tmp_path / "walk.mcap", "--plan", folder / "plan.json").stdout
+    assert told.startswith("No start is known, so the walk is sought anywhere")
     bare, walk = (
         echostep.replay(each, folder / "plan.json", start=Pose(1.0, 2.0, np.pi / 2))
         for each in (folder / "bare.mcap", tmp_path / "walk.mcap")

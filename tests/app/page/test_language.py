@@ -62,7 +62,8 @@ STATUSES = (
     "tracking, outside the building, 0.4 m",
     "uncertain, 12 m above the start, 40 m",
     "lost: nothing from the foot for 120 s",
-    "lost: 7 places fit; walk on, turn into a room or tap where you are",
+    "uncertain, 2 m, 3 % elsewhere",
+    "lost: 7 places fit, 24 % in all; walk on, turn into a room or tap where you are",
     "this plan does not fit: is it another building or floor, or mirrored?",
 )
 CUES = (

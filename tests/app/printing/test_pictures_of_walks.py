@@ -5,14 +5,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.patches import Ellipse
 
 import echostep
 from echostep.errors import EchostepError
+from echostep.localization import LikelyPlace, TrackStatus
 from echostep.plan import load_plan
+from echostep_app.output.track_plot import WORDS, track_figure
 from echostep_app.printing.picture_files import ENDINGS
 from walks import DEMO, WALK, foot_track
 
@@ -32,6 +38,22 @@ def test_a_picture_is_of_the_kind_of_its_name_and_the_same_each_time(
     walk.draw(str(again := tmp_path / f"again{ending}"))
     assert first.read_bytes().startswith(begins[ending])
     assert first.read_bytes() == again.read_bytes()
+
+
+def test_a_walk_is_drawn_in_outlines_on_its_plan(walk: echostep.Walk) -> None:
+    """Each region in the colour of its word, and never larger than the plan; without one, each place as strong as its share."""
+    end = walk.estimates[-1]
+    places = tuple(LikelyPlace(share, 4.0, 5.0, 0, 0.5, 0.0) for share in (0.5, 0.3))
+    doubtful = replace(end, t_s=end.t_s + 1.0, right=0.8, hypotheses=places, status=TrackStatus.UNCERTAIN, xx_m2=900.0)
+    with track_figure(walk.plan, [*walk.estimates[:8], doubtful], None, "x") as figure:
+        (axes,) = figure.axes
+    drawn = [patch for patch in axes.patches if isinstance(patch, Ellipse)]
+    assert not any(patch.get_fill() for patch in drawn)
+    assert [patch.get_alpha() for patch in drawn[-2:]] == [0.5, 0.3]
+    assert {to_hex(patch.get_edgecolor()) for patch in drawn} == {
+        WORDS[TrackStatus(word)] for word in ("tracking", "uncertain")
+    }
+    assert np.ptp(axes.get_xlim()) < 1.1 * np.ptp(walk.plan.levels[0].walls[:, ::2])
 
 
 def test_another_kind_of_picture_is_refused(walk: echostep.Walk, tmp_path: Path) -> None:

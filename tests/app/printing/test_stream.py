@@ -171,12 +171,14 @@ def mode(path: Path) -> int:
     return path.stat().st_mode & 0o777
 
 
-def test_a_new_file_is_private_and_one_that_exists_keeps_its_mode(tmp_path: Path) -> None:
-    assert mode(claim(tmp_path / "track.csv")) == 0o600
-    shared = tmp_path / "shared.csv"
-    shared.write_text("old")
-    assert mode(claim(shared)) == 0o644
-    assert shared.read_text() == "old"
+def test_a_new_file_is_private_and_earlier_ones_keep_content_and_mode(tmp_path: Path) -> None:
+    track = tmp_path / "track.csv"
+    for text in ("first", "second"):
+        track.write_text(text)
+        track.chmod(0o644)
+        assert mode(claim(track)) == 0o600
+    assert [(tmp_path / f"track-000{k}.csv").read_text() for k in (1, 2)] == ["first", "second"]
+    assert mode(tmp_path / "track-0001.csv") == 0o644
 
 
 @pytest.mark.slow

@@ -115,7 +115,7 @@ def test_an_ellipse_holds_what_its_distance_says(tmp_path: Path) -> None:
 def test_time_and_places_without_a_position(tmp_path: Path) -> None:
     """10 s at 1 m/s, rows at 0 and 1 s, one that is lost at 2 s, and at 8 s: known are 0 to 2 s without its end, and 8 to 10 s."""
     truth = "t,x,y\n" + "".join(f"{0.1 * k:.1f},{0.1 * k:.1f},0.5\n" for k in range(101))
-    track = "t,x,y,status\n0,0,0.5,tracking\n1,1,0.5,tracking\n2,2,0.5,lost\n8,8,0.5,uncertain\n"
+    track = "t,x,y,status\n0,0,0.5,tracking\n1,1,0.5,tracking\n2,9,9,lost\n8,8,0.5,uncertain\n"
     card = scored(tmp_path, track, truth)
     assert card.availability == pytest.approx((20 + 21) / 101)
     assert card.coverage == pytest.approx(5 / 11)  # the square metres from 0, 1, 8, 9 and 10 m on, of 11

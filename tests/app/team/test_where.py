@@ -130,7 +130,7 @@ def test_tak_has_no_point_of_it(published: list[Report]) -> None:
 
 
 def test_the_terminal_and_the_page_name_no_place(plan: Plan) -> None:
-    assert describe(lost(10.0), plan).startswith("lost: place not known, 2 places fit")
+    assert describe(lost(10.0), plan).startswith("lost: place not known, 2 places fit, 100 % in all")
     taps = Taps(plan)
     assert (taps.where(lost(10.0)), taps.where(told(*OFFICE))) == ("", "in Office 1")
     assert taps.places(lost(10.0)) == "places that fit: 1 in Office 1 50 % · 2 in North corridor 50 %"

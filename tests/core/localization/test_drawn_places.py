@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,8 +78,9 @@ def test_a_plan_that_states_nothing_is_exact() -> None:
 
 def test_a_map_that_may_be_off_makes_small_errors_less_likely() -> None:
     """A particle at the place: by the probability that two dimensions are off by less; at the limit: never."""
-    x, zero, weight = np.array([0.0, 1.0]), np.zeros(2), np.array([0.5, 0.5])
-    near, about = weight_about(x, zero, zero, weight, (0.0, 0.0, 0.0), (1.0, 5.0), 0.4)
+    zero, weight = np.zeros(2), np.array([0.5, 0.5])
+    cloud: Any = SimpleNamespace(map_x_m=np.array([0.0, 1.0]), y_m=zero, z_m=zero, weight=weight)
+    near, about = weight_about(cloud, Pose(0.0, 0.0, 0.0), 0.0, 0.4)
     assert near == pytest.approx(0.5 * (1.0 - math.exp(-0.5 * (1.0 / 0.4) ** 2)))
     assert about == pytest.approx(1.0, abs=1e-6)
 

@@ -15,6 +15,7 @@ import pytest
 from echostep.localization import CloudSettings, Estimate, Start, TrackStatus
 from echostep.localization.cloud_estimate import estimate_of
 from echostep.localization.particles.cloud import cloud_about
+from echostep.particles.ellipse import in_ellipse95
 from echostep.particles.limits import RISK
 from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.level_sheet import lay_out_levels
@@ -79,6 +80,29 @@ def test_the_likelier_place_is_claimed_beside_others() -> None:
     assert _in_two_places(0.2).claims_place
     other_level = tuple(replace(place, level=1) for place in _in_two_places(0.2).hypotheses)
     assert not replace(_in_two_places(0.2), hypotheses=other_level).claims_place
+
+
+@pytest.mark.parametrize(
+    ("second", "sd_m", "here"),
+    [(0.0, 0.1, 1.0), (0.0, 0.1, 0.99), (0.0, 1.2, 0.97), (0.03, 0.1, 0.99), (0.01, 0.8, 0.97)],
+)
+def test_the_region_of_95_percent_holds_95_percent_of_the_belief(second: float, sd_m: float, here: float) -> None:
+    """Of all places that the belief gives: about the origin, at the second one, and elsewhere."""
+    found, rng = _in_two_places(second, sd_m, here), np.random.default_rng(2)
+    in_cloud, far = rng.random(20_000) < here, rng.random(20_000) < second
+    true_m = rng.normal(0.0, sd_m, (20_000, 2)) + np.outer(far, (APART_M, 0.0)) + np.outer(~in_cloud, (0.0, 200.0))
+    moments_m2 = np.array((found.xx_m2, found.xy_m2, found.yy_m2))
+    held = in_ellipse95(true_m - [found.x_m, found.y_m], moments_m2[:, None].T)
+    assert 0.93 < held.mean() < 0.97
+    assert found.is_one_place
+    assert found.right == pytest.approx(here * (1.0 - second), abs=0.02)
+    assert found.ellipse95.major_m < 4.0 * sd_m
+
+
+def test_places_have_their_shares_of_the_belief_where_none_has_enough() -> None:
+    found = _in_two_places(0.4, here=0.7)
+    assert not found.is_one_place
+    assert sorted(place.probability for place in found.hypotheses) == pytest.approx([0.28, 0.42], abs=0.01)
 
 
 SHEET = lay_out_levels(tower(2)).sheet

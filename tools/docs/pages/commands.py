@@ -42,7 +42,7 @@ def page() -> str:
         parts.append(f"## {name}\n\n{inspect.cleandoc(command.callback.__doc__ or '')}\n")
         if own := "".join(row for row in rows[name] if row not in common.values()):
             parts.append(TABLE + own.replace("out/NAME", f"out/{name.rpartition(' ')[2]}"))
-        if shared := ", ".join(chain(*(_options(row) for row in rows[name] if row in common.values()))):
+        if shared := ", ".join(max(_options(row), key=len) for row in rows[name] if row in common.values()):
             parts.append(f"[Common](#common-options): {shared}.\n")
     return "\n".join([*parts, COMMON, TABLE + "".join(sorted(common.values()))])
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import LOCAL, Host, Lang, Plan, Port, Seconds, page_address
+from echostep_app.commands.options import LOCAL, Host, Lang, Plan, Port, Seconds, out_option, page_address
 
 app = typer.Typer()
 
@@ -26,9 +26,9 @@ def command(
         ),
     ],
     plan: Plan,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE", help="The recording to write; each run gets a new number.")
-    ] = Path("out/command/operation.mcap"),
+    out: Annotated[Path, out_option("FILE", "The recording to write; each run gets a new number.")] = Path(
+        "out/command/operation.mcap"
+    ),
     team: Annotated[str | None, typer.Option("--team", help="Only this team.")] = None,
     seconds: Seconds = None,
     as_json: Annotated[

@@ -19,12 +19,13 @@ from echostep_app.commands.options import (
     Start,
     Thigh,
     Units,
+    of_kind,
+    out_option,
     picture_option,
 )
 from echostep_app.extras import require
 
 app = typer.Typer()
-TRACK = Path("track.csv")
 Truth = Annotated[
     Path | None,
     typer.Option("--truth", metavar="FILE", help="True path to compare with, as of score, on the foot's clock."),
@@ -34,7 +35,7 @@ Truth = Annotated[
 @app.command("map")
 def map_command(
     recording: Annotated[Path, typer.Argument(metavar="WALK", help="A recorded walk (.mcap) through a building.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    out: Annotated[Path, out_option("PLAN", "The plan to write (JSON).")],
     picture: Annotated[Path | None, picture_option("Draw plan and path there")] = None,
 ) -> None:
     """Draw the plan of a building from a recorded walk."""
@@ -47,7 +48,7 @@ def map_command(
 @app.command("import")
 def import_command(
     imu: Annotated[Path, typer.Argument(help="Recording of a foot IMU: a file, folder or zip, as of foot.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="The recording to write.")],
+    out: Annotated[Path, out_option("OUT", "The recording to write.")],
     columns: Columns = None,
     units: Units = None,
     pressure: Annotated[
@@ -75,8 +76,9 @@ def foot(
         Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s; or another program's.")
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV); with --plan, its folder: out/foot.")
-    ] = TRACK,
+        Path | None,
+        typer.Option("--out", "-o", metavar="FILE|DIR", help="The track [track.csv]; with --plan a folder [out/foot]."),
+    ] = None,
     profile: Annotated[
         str,
         typer.Option(
@@ -95,11 +97,11 @@ def foot(
     from echostep_app.offline.foreign_columns import parse_naming
 
     naming = parse_naming(columns, units)
+    of_kind(out, plan is not None)
     if plan is None:
-        offline.foot(imu, out, profile, picture, naming)
+        offline.foot(imu, out or Path("track.csv"), profile, picture, naming)
     else:
-        folder = Path("out/foot") if out == TRACK else out.parent
-        offline.foot_on_plan(imu, folder, plan, start, truth, naming)
+        offline.foot_on_plan(imu, out or Path("out/foot"), plan, start, truth, naming)
 
 
 @app.command()
@@ -115,7 +117,7 @@ def legs(
     ],
     thigh: Thigh = None,
     shank: Shank = None,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The track to write (CSV).")] = Path("track.csv"),
+    out: Annotated[Path, out_option("FILE", "The track to write (CSV).")] = Path("track.csv"),
     profile: Annotated[
         str,
         typer.Option("--profile", metavar="NAME", help="default, or lee2010: that paper's method (echostep-studies)."),
@@ -150,7 +152,7 @@ def floors(
             "--heights", metavar="METRES", help="Heights of the floors, as 0,3.5,7; auto: from the recording."
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The floors to write (CSV).")] = Path("floors.csv"),
+    out: Annotated[Path, out_option("FILE", "The floors to write (CSV).")] = Path("floors.csv"),
     start: Annotated[
         int | None, typer.Option("--start", metavar="FLOOR", help="Floor at the start, if known.", min=0)
     ] = None,

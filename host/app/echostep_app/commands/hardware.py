@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Shank, Thigh
+from echostep_app.commands.options import Shank, Thigh, out_option
 from echostep_app.printing.lines import say
 
 app = typer.Typer()
@@ -51,7 +51,7 @@ def bench_report(
     board: Annotated[str | None, typer.Option("--board", metavar="PORT", help="Port of the board.")] = None,
     foot: Annotated[str | None, typer.Option("--foot", metavar="PORT", help="Port of a foot board.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds to listen.", min=3.0, max=3600.0)] = 30.0,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The report.")] = Path("bench-report.txt"),
+    out: Annotated[Path, out_option("FILE", "The report.")] = Path("bench-report.txt"),
     schedule: Annotated[
         FiredBy | None, typer.Option(help="How the rangers fire meanwhile; without it, as they do now.")
     ] = None,
@@ -99,9 +99,9 @@ def calibrate(
             help="Port of a foot board, for accelerometers; without it, it is searched for.",
         ),
     ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="Settings file to write; its other sections are kept.")
-    ] = Path("calibration.toml"),
+    out: Annotated[Path, out_option("FILE", "Settings file to write; its other sections are kept.")] = Path(
+        "calibration.toml"
+    ),
     thigh: Thigh = None,
     shank: Shank = None,
     walked: Annotated[

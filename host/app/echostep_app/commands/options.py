@@ -51,6 +51,19 @@ def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
     return path
 
 
+def out_option(kind: str, text: str) -> Any:
+    """The option of what a command writes: a folder (DIR), or a file."""
+    return typer.Option("--out", "-o", metavar=kind, callback=lambda path: of_kind(path, kind == "DIR"), help=text)
+
+
+def of_kind(path: Path | None, is_folder: bool) -> Path | None:
+    """The same path; raises EchostepError where a file is given for a folder, or a folder for a file."""
+    kinds = ("a file", "a folder")
+    if path is not None and path.exists() and path.is_dir() != is_folder:
+        raise EchostepError(f"{path}: is {kinds[path.is_dir()]}: --out is {kinds[is_folder]} here")
+    return path
+
+
 def picture_option(what: str) -> Any:
     """The option of a picture that is drawn besides."""
     return typer.Option("--picture", metavar="FILE", callback=picture_file, help=f"{what} (PNG, SVG, PDF).")
@@ -113,7 +126,7 @@ StartSd = Annotated[
 Browser = Annotated[
     bool, typer.Option("--open/--no-open", help="Open the page in a browser where there is one.", show_default=False)
 ]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for track.csv, track.png and the recording.")]
+Out = Annotated[Path, out_option("DIR", "Folder for track.csv, track.png and the recording.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", metavar="FILE", help="Settings (TOML).")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)]
 RecordedSeed = Annotated[int | None, typer.Option("--seed", help="Seed; the recorded one by default.", min=0)]

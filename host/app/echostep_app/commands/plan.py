@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep_app.commands.options import Lang, picture_option
+from echostep_app.commands.options import Browser, Lang, out_option, picture_option
 from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import say
 
@@ -82,7 +82,7 @@ Doors = Annotated[
 @app.command("import")
 def import_(
     files: Files,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="PLAN", help="The plan to write (JSON).")],
+    out: Annotated[Path, out_option("PLAN", "The plan to write (JSON).")],
     storey: Storey = 3.5,
     layer: Layers = None,
     units: Unit = None,
@@ -182,7 +182,7 @@ def check(
 @app.command()
 def show(
     file: PlanFile,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The picture to write (PNG, SVG, PDF).")],
+    out: Annotated[Path, out_option("FILE", "The picture to write (PNG, SVG, PDF).")],
     level: Annotated[
         str | None, typer.Option("--level", metavar="NAME", help="One level, by name or index; all without it.")
     ] = None,
@@ -203,7 +203,7 @@ def show(
 @app.command()
 def overlay(
     file: PlanFile,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The overlay to write (.kmz).")],
+    out: Annotated[Path, out_option("FILE", "The overlay to write (.kmz).")],
 ) -> None:
     """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
     require(str(out), "matplotlib", "pyproj")
@@ -224,14 +224,14 @@ def edit(
     port: Annotated[
         int | None, typer.Option("--port", help="Port of the page [8420, or a free one].", min=0, max=65535)
     ] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="Open no browser: print the address alone.")] = False,
+    browser: Browser = True,
     lang: Lang = None,
 ) -> None:
     """Clean a plan, draw walls and doors, name rooms on a page in the browser, until Ctrl-C."""
     require("the plan editor", *PAGE)
     from echostep_app.page.editor import edit_plan
 
-    edit_plan(file, picture, port, lang.value if lang else None, browser=not headless)
+    edit_plan(file, picture, port, lang.value if lang else None, browser=browser)
 
 
 def _level(plan: Plan, name: str) -> int:

@@ -12,14 +12,14 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Plan, RecordedSeed, SettingsFile
+from echostep_app.commands.options import OptionalPlan, RecordedSeed, SettingsFile, out_option
 from echostep_app.printing.lines import say
 from echostep_app.printing.people import outlast_output
 
 app = typer.Typer()
 
 Recording = Annotated[Path, typer.Argument(metavar="FILE", help="A recording (.mcap).")]
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="The recording to write.")]
+Out = Annotated[Path, out_option("OUT", "The recording to write.")]
 
 
 @app.command()
@@ -50,13 +50,11 @@ def cut(
 @app.command()
 def export(
     file: Recording,
-    plan: Plan,
     out: Annotated[
         Path,
-        typer.Option(
-            "--out", "-o", metavar="OUT", help="track.csv, .parquet, .gpkg, .kml, .gpx, or .mcap with derived messages."
-        ),
+        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, .geojson, .tum, or .mcap with derived messages."),
     ],
+    plan: OptionalPlan = None,
     start: Annotated[
         str | None, typer.Option("--start", metavar="X,Y,DEG", help="Position and heading of the wearer at the start.")
     ] = None,

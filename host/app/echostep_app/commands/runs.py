@@ -22,6 +22,7 @@ from echostep_app.commands.options import (
     Port,
     RecordedSeed,
     Seed,
+    out_option,
     page_address,
 )
 from echostep_simulation.kits import Kit
@@ -92,9 +93,7 @@ def live(
 @with_groups
 def record(
     ports: Ports,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The recording to write.")] = Path(
-        "out/recording.mcap"
-    ),
+    out: Annotated[Path, out_option("FILE", "The recording to write.")] = Path("out/recording.mcap"),
 ) -> None:
     """Record the ports without tracking."""
     from echostep_app.session.runs import live as live_run
@@ -116,11 +115,14 @@ def replay(
     truth: Annotated[
         Path | None, typer.Option("--truth", metavar="FILE", help="True path to compare with (CSV).")
     ] = None,
+    browser: Browser = True,
 ) -> None:
     """Track a recorded walk again, as it was tracked live."""
+    from echostep_app.commands.actions.foreign import refuse_foreign
     from echostep_app.session.runs import replay as replay_run
 
-    outputs = output.options(out, stays_on_terminal=True)
+    refuse_foreign(recording)
+    outputs = output.options(out, stays_on_terminal=True, browser=browser)
     replay_run.replay(recording, tracking.options(seed), truth, outputs)
 
 

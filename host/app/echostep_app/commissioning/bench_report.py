@@ -16,6 +16,7 @@ import numpy as np
 from echostep.board.air import CELSIUS, USUAL_C, sound_m_s
 from echostep.board.messages import GYROS_INVALID, Outcome, Ranger, Schedule
 from echostep.errors import EchostepError
+from echostep.file_mode import keep_earlier
 from echostep_app.board.faults.findings import Finding, Severity
 from echostep_app.commissioning.diagnosis import Diagnosis
 from echostep_app.commissioning.doctor import examine
@@ -47,7 +48,7 @@ def write(board: str | None, foot: str | None, seconds: float, out: Path, schedu
     if not report.probed:
         raise EchostepError(str(report.findings[0]) if report.findings else "no board has answered")
     with as_error(f"cannot write {out}"):
-        out.write_text("\n".join(text(report)) + "\n", encoding="utf-8")
+        keep_earlier(out).write_text("\n".join(text(report)) + "\n", encoding="utf-8")
     return f"{out}: fill in the lines of the measurements (firmware/bench.md) and send it in"
 
 

@@ -20,6 +20,7 @@ from rich.console import Console
 
 from echostep.board.calibration import GYROS
 from echostep.errors import EchostepError
+from echostep.file_mode import keep_earlier
 from echostep.ports.chunks import BOARD
 from echostep.settings import Settings, parse_settings, read_settings
 from echostep_app.board.faults.health import Severity, board_findings
@@ -205,4 +206,4 @@ def write_sections(out: Path, sections: Sections) -> None:
     parse_settings(text, str(out))
     with as_error(f"{out}: cannot write the settings"):
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(out, text.encode())
+        write_whole(keep_earlier(out), text.encode())

@@ -236,7 +236,11 @@ class Derived:
         piece_start = (len(self._track) - 2) // TRACK_PIECE * TRACK_PIECE if len(self._track) > 1 else 0
         drawn = {
             f"track_{piece_start}": (LINE_STRIP, TRACK, self._track[piece_start:]),
-            "ellipse95": (LINE_STRIP, ELLIPSE, [(x, y, e.z_m) for x, y in outline95(e, ELLIPSE_POINTS).tolist()]),
+            "ellipse95": (
+                LINE_STRIP,
+                ELLIPSE,
+                [(x, y, e.z_m) for x, y in outline95(e, ELLIPSE_POINTS).tolist() if e.is_one_place],
+            ),
         }
         for which, color in ((Ranger.LEFT, LEFT_BEAM), (Ranger.RIGHT, RIGHT_BEAM)):
             echo_ns, range_m = self._last_echo.get(which, (-1 << 62, 0.0))

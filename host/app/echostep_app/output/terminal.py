@@ -29,7 +29,7 @@ from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Finding, Severity, all_findings
 from echostep_app.plan.places.bearing import heading_words
-from echostep_app.wearer.steady_status import SteadyStatus, running_note
+from echostep_app.wearer.steady_status import SteadyStatus, elsewhere, fitting, running_note
 
 REFRESH_S = 0.1
 MAX_FINDINGS = 3  # shown at a time
@@ -175,10 +175,10 @@ def describe(e: Estimate | None, plan: Plan) -> str:
     if e is None:
         return "waiting for the foot to stand still"
     if not e.claims_place:
-        places = f", {len(e.hypotheses)} places fit" if len(e.hypotheses) > 1 else ""
+        places = f", {fitting(e.hypotheses)}" if e.hypotheses else ""
         return f"{e.status.value}: place not known{places}   step {e.step}   t {e.t_s:.1f} s"
     return (
-        f"{e.status.value}, {e.ellipse95.major_m:.2f} m   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
+        f"{e.status.value}, {e.ellipse95.major_m:.2f} m{elsewhere(e)}   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
         f"heading {heading_words(plan, e.heading_rad, e.heading_sd_rad)}   step {e.step}   t {e.t_s:.1f} s"
     )
 

@@ -18,14 +18,14 @@ import numpy as np
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
 from echostep.localization import Estimate
-from echostep.plan import Plan
+from echostep.plan import NO_PLAN, Plan
 from echostep.ports.chunks import Portion
 from echostep.recording import Recording, clock_of, open_parts
 from echostep.tracker import Tracker
 from echostep.walk.table import columns_of, refuse_none
 from echostep_app.extras import require
 from echostep_app.output.derived import Derived
-from echostep_app.output.map_files import TrackOnPlan, flat, write_geopackage, write_gpx, write_kml
+from echostep_app.output.map_files import TrackOnPlan, flat, write_geojson, write_geopackage, write_gpx, write_kml
 from echostep_app.plan.georeference import earth_of
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console_for_people
@@ -34,7 +34,7 @@ from echostep_app.printing.progress import with_bar
 from echostep_app.recording.recorder import Recorder
 
 
-def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recording, Plan], Tracker]) -> str:
+def export(path: Path, plan_path: Path | None, out: Path, tracker_of: Callable[[Recording, Plan], Tracker]) -> str:
     """Track a recording and write the track in the format of the suffix of `out`; returns a summary line.
 
     Raises EchostepError for an unknown format, a plan without the georeference that the format needs, and a recording without estimates.
@@ -43,10 +43,10 @@ def export(path: Path, plan_path: Path, out: Path, tracker_of: Callable[[Recordi
         raise EchostepError(f"{out}: unknown kind of file: choose from {', '.join(FORMATS)}")
     if needed := "pyarrow" if out.suffix == ".parquet" else "pyproj" if out.suffix in NEEDS_GEOREFERENCE else "":
         require(str(out), needed)
-    recording, plan = open_parts([path]), open_limited(plan_path)
+    recording, plan = open_parts([path]), open_limited(plan_path) if plan_path else NO_PLAN
     if earth_of(plan) is None and out.suffix in NEEDS_GEOREFERENCE:
         raise EchostepError(
-            f"{plan_path}: {out.suffix} needs a georeference: add longitude and latitude of the map's origin to the plan"
+            f"{plan_path or out}: {out.suffix} needs a plan with a georeference: longitude and latitude of the map's origin"
         )
     if out.exists() and out.resolve() == path.resolve():
         raise EchostepError(f"{out}: that is the recording itself: give another name with -o")
@@ -130,7 +130,8 @@ FORMATS: dict[str, Write] = {
     ".gpkg": write_geopackage,
     ".kml": write_kml,
     ".gpx": write_gpx,
+    ".geojson": write_geojson,
     ".tum": _write_tum,
     ".mcap": lambda *_: None,
 }
-NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx")
+NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx", ".geojson")

@@ -1,65 +1,84 @@
 # SPDX-License-Identifier: MIT
-"""track.csv and track.png of a run.
+"""track.png of a run: the plan as `plan show` draws it, and the walk on it.
 
-In: a plan, estimates, the true path where it is known. Out: CSV files and pictures. Owns nothing.
+In: a plan, estimates, the true path where it is known. Out: pictures. Owns the colours of the walk.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echostep.aiding import BeaconPlace, BeaconState
 from echostep.arrays import Floats
-from echostep.localization import Estimate
-from echostep.plan import Level, Plan
+from echostep.localization import Estimate, TrackStatus
+from echostep.particles.ellipse import CHI2_95
+from echostep.plan import Plan
+from echostep_app.plan.cropping import Bounds
+from echostep_app.plan.pictures.drawing import Layer, plan_figure, texts_of
+from echostep_app.plan.pictures.labels import fonts_for
 from echostep_app.plan.routing import Route
 from echostep_app.printing.picture_files import save_picture
 from echostep_app.scorecard.track_columns import ScoredPath
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-MAX_HEIGHT_INCHES = 40.0  # of the picture
 NEARBY_S = 2.5  # of the truth from an estimate: they come at each step, and twice a second while standing
 GAP_S = 5.0  # the line of the track is broken after so long on another level
-MAX_ELLIPSES = 60  # drawn per level
+MOST_REGIONS = 24  # drawn per level
+EDGE_M = 1.0  # about a walk without a plan
 ROUTE_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
 TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour blindness [Okabe and Ito 2008]
+WORDS = {TrackStatus.TRACKING: TRACK_COLOUR, TrackStatus.UNCERTAIN: "#e69f00", TrackStatus.LOST: "#000000"}
 
 
 def draw_track(
     path: Path, plan: Plan, estimates: Sequence[Estimate], truth: ScoredPath | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
 ) -> None:  # fmt: skip
-    """Draw plan, true path, route, beacons, estimates and 95 % ellipses as PNG, SVG or PDF, by the ending of the name."""
-    save_picture(track_figure(plan, estimates, truth, title, route, beacons), path)
+    """Draw plan, true path, route, beacons, estimates and their regions of 95 % as PNG, SVG or PDF, by the ending of the name."""
+    with track_figure(plan, estimates, truth, title, route, beacons) as figure:
+        save_picture(figure, path)
 
 
+@contextmanager
 def track_figure(
     plan: Plan, estimates: Sequence[Estimate], truth: ScoredPath | None, title: str,
     route: Route | None = None, beacons: Sequence[BeaconPlace] = (),
-) -> Figure:  # fmt: skip
-    """The picture: one panel for each visited level, the lowest at the bottom."""
-    from matplotlib.figure import Figure
-
+) -> Iterator[Figure]:  # fmt: skip
+    """The picture of the visited levels, to be written within the context."""
     visited = sorted({e.level for e in estimates}) or [0]
-    inches = min(sum(_height(plan.levels[k]) for k in visited), MAX_HEIGHT_INCHES)
-    figure = Figure(figsize=(10, inches), dpi=120, layout="constrained")
-    figure.suptitle(title, parse_math=False)
-    for axes, k in zip(figure.subplots(len(visited), squeeze=False)[::-1, 0], visited, strict=True):
-        here = [e for e in estimates if e.level == k]
-        _draw_level(axes, plan.levels[k], here, _near(truth, here) if truth else None)
-        _draw_guidance(axes, k, route, [b for b in beacons if b.level == k])
-        if len(plan.levels) > 1:
-            axes.set_title(plan.levels[k].name, loc="left", fontsize=9, parse_math=False)
-    return figure
+
+    def draw(axes: Any, level: int) -> None:
+        here = [e for e in estimates if e.level == level]
+        if truth:
+            axes.plot(
+                *_near(truth, here).T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, solid_capstyle="round", zorder=2
+            )
+        _draw_guidance(axes, level, route, [b for b in beacons if b.level == level])
+        _draw_walk(axes, [e for e in here if e.claims_place or not plan.is_drawn])
+        _draw_regions(axes, here[:: math.ceil(len(here) / MOST_REGIONS) or 1])
+
+    layer = Layer(draw, _legend(estimates, truth, route, beacons), title)
+    with fonts_for([*texts_of(plan, visited), title]):
+        yield plan_figure(plan, visited, None if plan.is_drawn else _about(estimates), layer=layer)
+
+
+def _about(estimates: Sequence[Estimate]) -> Bounds | None:
+    """The rectangle about a walk without a plan."""
+    if not estimates:
+        return None
+    at_m = np.array([(e.x_m, e.y_m) for e in estimates])
+    (x0, y0), (x1, y1) = at_m.min(0) - EDGE_M, at_m.max(0) + EDGE_M
+    return float(x0), float(y0), float(x1), float(y1)
 
 
 def _near(truth: ScoredPath, estimates: Sequence[Estimate]) -> Floats:
@@ -70,61 +89,63 @@ def _near(truth: ScoredPath, estimates: Sequence[Estimate]) -> Floats:
     return np.where((off_s < NEARBY_S)[:, None], truth.xy_m, np.nan)
 
 
-def _draw_level(axes: Axes, level: Level, estimates: Sequence[Estimate], truth_m: Floats | None) -> None:
+def _draw_walk(axes: Any, estimates: Sequence[Estimate]) -> None:
+    """The line of the positions, each piece in the colour of its word; a circle where it begins, a square where it ends."""
     from matplotlib.collections import LineCollection
-    from matplotlib.patches import Ellipse as Patch
 
-    axes.set(aspect="equal", xlabel="x / m", ylabel="y / m")
-    axes.add_collection(LineCollection(list(level.solid.reshape(-1, 2, 2)), colors="#444444", linewidths=1.2))
-    for room in level.rooms:
-        axes.text(*room.at_m, room.name, ha="center", va="center", color="#888888", fontsize=8, parse_math=False)
-    if truth_m is not None:
-        axes.plot(*truth_m.T, color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth")
-    for e in estimates[:: max(1, len(estimates) // MAX_ELLIPSES)]:
-        ellipse = e.ellipse95
-        patch = Patch(
-            (e.x_m, e.y_m),
-            2 * ellipse.major_m,
-            2 * ellipse.minor_m,
-            angle=math.degrees(ellipse.angle_rad),
-            facecolor=TRACK_COLOUR,
-            alpha=0.15,
-        )
-        axes.add_patch(patch)
-    track = _with_gaps([(e.t_s, e.x_m, e.y_m) for e in estimates])
-    axes.plot(*track.T, color=TRACK_COLOUR, linewidth=1, marker=".", markersize=4, label="estimate, 95 % ellipses")
-    axes.autoscale_view()
-    axes.legend(loc="upper right", fontsize=8)
+    pairs = [(a, b) for a, b in pairwise(estimates) if b.t_s - a.t_s <= GAP_S]
+    lines = [((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in pairs]
+    axes.add_collection(LineCollection(lines, colors=[WORDS[b.status] for _, b in pairs], linewidths=1.6, zorder=5))
+    for e, sign in zip([*estimates[:1], *estimates[-1:]], "os", strict=False):
+        axes.plot(e.x_m, e.y_m, sign, markersize=7, color=WORDS[e.status], zorder=6)
 
 
-def _draw_guidance(axes: Axes, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:
+def _draw_regions(axes: Any, estimates: Sequence[Estimate]) -> None:
+    """The outline of the region of 95 %, where there is one; else of each place, as strong as its share of the belief."""
+    from matplotlib.patches import Ellipse
+
+    outline = partial(Ellipse, fill=False, linewidth=0.8, zorder=4)
+    for e in estimates:
+        major_m, minor_m, angle_rad = e.ellipse95
+        colour = WORDS[e.status]
+        if e.is_one_place:
+            turn = math.degrees(angle_rad)
+            axes.add_patch(outline((e.x_m, e.y_m), 2 * major_m, 2 * minor_m, angle=turn, edgecolor=colour, alpha=0.6))
+        for place in () if e.is_one_place else e.hypotheses:
+            wide_m = 2.0 * math.sqrt(CHI2_95) * place.sd_m
+            at_m, strong = (place.x_m, place.y_m), min(place.probability, 1.0)
+            axes.add_patch(outline(at_m, wide_m, wide_m, linestyle=":", edgecolor=colour, alpha=strong))
+
+
+def _draw_guidance(axes: Any, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:
     """Draw the route, and each beacon with two standard deviations; moved and silent beacons are hollow."""
     from matplotlib.patches import Circle
 
     for stretch in route.stretches if route else ():
         if stretch.level == level:
-            axes.plot(*stretch.line_m.T, color=ROUTE_COLOUR, linewidth=2, linestyle="--", label="route")
+            axes.plot(*stretch.line_m.T, color=ROUTE_COLOUR, linewidth=2, linestyle="--", zorder=3)
     for b in beacons:
-        filled = b.state is BeaconState.WELL
-        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=BEACON_COLOUR if filled else "none", markersize=6)
+        filled = BEACON_COLOUR if b.state is BeaconState.WELL else "none"
+        axes.plot(b.x_m, b.y_m, "^", color=BEACON_COLOUR, mfc=filled, markersize=6)
         axes.add_patch(Circle((b.x_m, b.y_m), 2.0 * b.sd_m, color=BEACON_COLOUR, alpha=0.15, lw=0))
-    if beacons:
-        axes.plot([], [], "^", color=BEACON_COLOUR, label="beacons (hollow: moved or silent)")
-    if beacons or route:
-        axes.legend(loc="upper right", fontsize=8)
 
 
-def _with_gaps(rows: Sequence[tuple[float, float, float]]) -> Floats:
-    """Positions (n, 2) of rows (t_s, x, y), with a row of NaN in each gap longer than GAP_S."""
-    table = np.array(rows).reshape(-1, 3)
-    breaks = np.flatnonzero(np.diff(table[:, 0]) > GAP_S) + 1
-    positions: Floats = np.insert(table[:, 1:], breaks, np.nan, axis=0)
-    return positions
+def _legend(
+    estimates: Sequence[Estimate], truth: ScoredPath | None, route: Route | None, beacons: Sequence[BeaconPlace]
+) -> list[Any]:
+    """The signs of the walk that are drawn."""
+    from matplotlib.lines import Line2D
 
-
-def _height(level: Level) -> float:
-    """Height (inches) of a panel that is ten inches wide, from the plan's aspect ratio."""
-    if not len(level.solid):
-        return 6.5
-    width, height = np.ptp(level.solid.reshape(-1, 2), axis=0)
-    return float(np.clip(1.0 + 9.2 * height / max(width, 1e-9), 4.0, 12.0))
+    line: Any = partial(Line2D, [], [])
+    seen = {e.status for e in estimates}
+    sign = {"linestyle": "", "color": TRACK_COLOUR}
+    kinds = (
+        (line(color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth"), truth),
+        *((line(color=WORDS[word], label=word.value), word in seen) for word in WORDS),
+        (line(marker="o", mfc="none", mew=0.8, markersize=9, **sign, label="95 % within"), estimates),
+        (line(marker="o", **sign, label="begins"), estimates),
+        (line(marker="s", **sign, label="ends"), estimates),
+        (line(color=ROUTE_COLOUR, linewidth=2, linestyle="--", label="route"), route),
+        (line(marker="^", linestyle="", color=BEACON_COLOUR, label="beacon (hollow: moved or silent)"), beacons),
+    )  # fmt: skip
+    return [handle for handle, is_drawn in kinds if is_drawn]

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from echostep.particles.ellipse import Ellipse
 from echostep.plan import Plan
 from echostep_app.page.elements.alarm import ShownAlarm
 from echostep_app.page.elements.drawn_walls import ShownDrawing
@@ -137,7 +138,7 @@ class ShownHypothesis:
 
 @dataclass(frozen=True, slots=True)
 class ShownEstimate:
-    """The estimate as the page reads it: position, `where` in words, 95 % ellipse, heading, status, share of the particles on each level.
+    """The estimate as the page reads it: position, `where` in words, 95 % ellipse (0: none), heading, status, share of the particles on each level.
 
     `heading`: in words. `protection_m`: the error is beyond it at a risk of 1 in 1,000; None where no radius is that safe. `hypotheses`: while
     several places fit; `places` names them in a sentence.
@@ -359,7 +360,7 @@ def _estimate(scene: PageScene, parts: FrameParts) -> ShownEstimate | None:
         level=e.level,
         where=parts.where,
         placed=parts.placed,
-        **e.ellipse95._asdict(),
+        **(e.ellipse95 if e.is_one_place else Ellipse(0.0, 0.0, 0.0))._asdict(),
         heading=parts.heading,
         heading_rad=e.heading_rad,
         heading_known=e.heading_sd_rad <= KNOWN_HEADING_RAD,

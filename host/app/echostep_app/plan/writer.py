@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.fields import UNWRITABLE
+from echostep.file_mode import keep_earlier
 from echostep.plan import FORMAT_VERSION, Connector, Door, Georeference, Level, Plan, Pose, Question, Room
 from echostep_app.printing.lines import as_error
 
@@ -20,7 +21,7 @@ from echostep_app.printing.lines import as_error
 def save_plan(plan: Plan, path: Path | str) -> None:
     """Write a plan; `load_plan` reads back an equal plan with another digest. Raises EchostepError when the file cannot be written."""
     with as_error(f"{path}: cannot write the plan"):
-        Path(path).write_text(plan_json(plan), encoding="utf-8")
+        keep_earlier(Path(path)).write_text(plan_json(plan), encoding="utf-8")
 
 
 def plan_json(plan: Plan) -> str:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from echostep.kernel_cache import on_compiling
 from echostep_app.printing.lines import complain
 
-COMPILING = "echostep: kernels are compiled, once on this computer: it takes a minute or two"
+COMPILING = "echostep: kernels are compiled, once on this computer: it takes about a minute"
 
 
 def tell_of_compiling() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import claim, keep_earlier
 from echostep_app.printing.lines import as_error
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def save_picture(figure: Figure, path: Path, *, software: str = "echostep", priv
     ending = check_picture(path).suffix.casefold()
     metadata = WITHOUT_DATE.get(ending, {"Software": software})
     with as_error(f"{path}: cannot write the picture"), mpl.rc_context({"svg.hashsalt": SALT}):
-        figure.savefig(claim(path) if private else path, format=ending[1:], metadata=metadata)
+        figure.savefig((claim if private else keep_earlier)(path), format=ending[1:], metadata=metadata)
 
 
 def svg_text(figure: Figure) -> str:

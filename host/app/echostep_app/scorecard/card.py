@@ -220,19 +220,26 @@ def is_surveyed(truth: ScoredPath) -> bool:
 
 
 def match(track: ScoredPath, truth: ScoredPath) -> Matched:
-    """The evaluation points: of a path the track's rows, of surveyed points theirs; raises EchostepError where there is no moment in common."""
+    """The evaluation points: of a path the track's rows, of surveyed points theirs; without those that the track marks as lost.
+
+    Raises EchostepError where there is no moment in common.
+    """
     surveyed = is_surveyed(truth)
     grid, other = (truth, track) if surveyed else (track, truth)
     chosen = np.flatnonzero((grid.t_s >= other.t_s[0]) & (grid.t_s <= other.t_s[-1]))
     if surveyed:
         chosen = chosen[_near(track.t_s, truth.t_s[chosen])]
+    row = np.searchsorted(track.t_s, grid.t_s[chosen], side="right") - 1 if surveyed else chosen
+    claimed = ~track.lost[row]
+    if len(row) and not claimed.any():
+        raise EchostepError(f"{track.path}: lost all the time: there is no place to score")
+    chosen, row = chosen[claimed], row[claimed]
     if not len(chosen):
         raise EchostepError(
             f"{track.path}: no row within the time of {truth.path} ({truth.t_s[0]:g} to {truth.t_s[-1]:g} s; "
             f"the track's is {track.t_s[0]:g} to {track.t_s[-1]:g} s): both need the same clock"
         )
     t_s = grid.t_s[chosen]
-    row = np.searchsorted(track.t_s, t_s, side="right") - 1 if surveyed else chosen
     true_row = chosen if surveyed else np.searchsorted(truth.t_s, t_s, side="right") - 1
     levels = track.level is not None and truth.level is not None
     heights = track.height_m is not None and truth.height_m is not None

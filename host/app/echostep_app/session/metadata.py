@@ -133,14 +133,16 @@ def parse_start(text: str, spread: str | None, plan: Plan) -> Pose | Start:
 
 
 def _room(name: str, plan: Plan) -> Start | None:
-    """Anywhere in the room of this name: in its outline, or within ROOM_M of its label; None for no such room."""
-    for k, level in enumerate(plan.levels):
-        for room in level.rooms:
-            if room.name.casefold() == name.casefold():
-                if room.outline_m is not None and len(room.outline_m):
-                    return Start(room_m=np.asarray(room.outline_m, np.float64), level=k)
-                return Start(Pose(*room.at_m, 0.0, k), ROOM_M, math.pi)
-    return None
+    """Anywhere in the room of this name, or the only one that begins so: in its outline, or within ROOM_M of its label; None for none."""
+    rooms = [(k, room) for k, level in enumerate(plan.levels) for room in level.rooms]
+    same = [each for each in rooms if each[1].name.casefold() == name.casefold()]
+    begin = [each for each in rooms if each[1].name.casefold().startswith(name.casefold())]
+    if not same and len(begin) != 1:
+        return None
+    k, room = (same or begin)[0]
+    if room.outline_m is not None and len(room.outline_m):
+        return Start(room_m=np.asarray(room.outline_m, np.float64), level=k)
+    return Start(Pose(*room.at_m, 0.0, k), ROOM_M, math.pi)
 
 
 def _parse_spread(text: str) -> tuple[float, float]:

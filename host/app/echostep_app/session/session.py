@@ -153,7 +153,7 @@ class Session:
 
     def prepare(self, *more: Part) -> None:
         """Compile missing kernels, before the first bytes come: the tracker's, and more."""
-        text = "Preparing; the first time on a computer its kernels are compiled, which takes half a minute"
+        text = "Preparing; the first time on a computer its kernels are compiled, which takes about a minute"
         if self.page:
             self.page.announce(f"{text[0].lower()}{text[1:]}")
         with progress_line(text) as show:

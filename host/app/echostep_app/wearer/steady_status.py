@@ -3,14 +3,15 @@
 
 In: statuses with the estimates' own times, so that a live run and its replay say the same. Out: the worst of the last HOLD_S. Owns those.
 The one rule for page, speech, terminal and reports; files, and whatever computes on, have each estimate's own status.
-`running_note`: a few words after the status while the foot rests too briefly for a walk; `late_words`, `span_words`: ages.
+`running_note`, `late_words`, `fitting`, `elsewhere`: words after the status: of a run, of an age, of places that fit, of what is elsewhere.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from echostep.localization import Estimate, TrackStatus
+from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
@@ -57,3 +58,15 @@ def late_words(age_s: float) -> str:
 def span_words(seconds: float) -> str:
     """A time as text: 3 s, 5 min."""
     return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
+
+
+def fitting(places: Sequence[LikelyPlace]) -> str:
+    """The number of places that fit, and their share of the belief."""
+    count, share = len(places), sum(place.probability for place in places)
+    return f"{count} {'place fits' if count == 1 else 'places fit'}, {100.0 * share:.0f} % in all"
+
+
+def elsewhere(estimate: Estimate) -> str:
+    """The share of the belief that is not at the position's place, where the position is not sure."""
+    share = round(100.0 * (1.0 - estimate.right))
+    return f", {share} % elsewhere" if share and estimate.status is TrackStatus.UNCERTAIN else ""

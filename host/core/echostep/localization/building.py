@@ -13,7 +13,7 @@ from echostep.echoes.likelihood import EchoModel
 from echostep.echoes.range_table import range_table_of
 from echostep.echoes.unplanned import Background, background
 from echostep.height.levels import UpperLevels
-from echostep.localization.cloud_estimate import Elsewhere
+from echostep.localization.cloud_estimate import Moments
 from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.grid.cells import GridCells, grid_cells
 from echostep.plan import Plan
@@ -76,10 +76,10 @@ class Building:
         return 0.0 if self.indoors is None else float(weight @ ~self.indoors.holds(x_m, y_m))
 
 
-def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Elsewhere | None:
+def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Moments | None:
     """Moments of the floor, all levels above one another; None for a plan without a floor."""
     if not len(floor.x_m):
         return None
     x = floor.x_m if sheet is None else floor.x_m - level_of(floor.x_m, sheet) * sheet.pitch_m
     (xx, xy), (_, yy) = np.cov(x, floor.y_m, bias=True).tolist()
-    return Elsewhere(float(x.mean()), float(floor.y_m.mean()), xx, xy, yy)
+    return Moments(float(x.mean()), float(floor.y_m.mean()), xx, xy, yy, 0.0, 0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.localization.particles.places import LikelyPlace
 from echostep.particles.ellipse import CHI2_95, Ellipse, ellipse95, in_ellipse95, widening_m2
-from echostep.particles.limits import LOST_M, TRACKING_M, WALKER_M_S
+from echostep.particles.limits import LOST_M, SURE, TRACKING_M, WALKER_M_S
 
 TAIL = 1.5  # of the protection radius of a normal distribution, assumed: errors of echoes and steps have heavier tails
 
@@ -40,9 +40,9 @@ class Estimate:
     """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
 
     `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
-    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite if none is that safe. `right`: probability that
-    the cloud is right; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
-    `hypotheses`: the likely places of a wide cloud, or of a cloud on several levels, the likeliest first.
+    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite if none is that safe. `right`: probability of
+    the position's place; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
+    `hypotheses`: the likely places where none is alone, the likeliest first, each with its share of the belief.
 
     >>> import echostep
     >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
@@ -91,6 +91,11 @@ class Estimate:
         """Whether a place lies in the 95 % ellipse; in an ellipse without area, only its centre does."""
         error_m, covariance_m2 = (x_m - self.x_m, y_m - self.y_m), (self.xx_m2, self.xy_m2, self.yy_m2)
         return bool(in_ellipse95(np.array(error_m), np.array(covariance_m2)))
+
+    @property
+    def is_one_place(self) -> bool:
+        """Whether one place has more than SURE of the belief: the ellipse is its region of 95 %; below that, `hypotheses` have their shares."""
+        return self.right > SURE and len(self.hypotheses) < 2
 
     @property
     def claims_place(self) -> bool:

@@ -34,7 +34,7 @@ from echostep.localization.unmeasured import UNOBSERVED_DOUBT, UnmeasuredWay
 from echostep.localization.window import RecentWay
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.kernels import systematic
-from echostep.particles.limits import BELIEVED, LOST_M, PROBABLE, TRACKING_M
+from echostep.particles.limits import BELIEVED, PROBABLE
 from echostep.path import MeasuredSegment, Odometer, PathSegment
 from echostep.plan import ANY_LEVEL, Pose
 from echostep.walls.echo_sources import Walls
@@ -277,9 +277,7 @@ class MapFilter:
         if self.belief.search is None or self.belief.search.cloud.is_searching:
             return False
         cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
-        place_m = mean.x_m, mean.y_m, float(self.cloud.weight @ self.cloud.z_m)
-        near, _ = weight_about(cloud.map_x_m, cloud.y_m, cloud.z_m, cloud.weight, place_m, (TRACKING_M, LOST_M))
-        return near > PROBABLE
+        return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""

@@ -31,6 +31,7 @@ from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
+from echostep.foot.sample_checks import FirstSamples
 from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
@@ -80,7 +81,7 @@ class Tracker:
         self._building = Building.of(plan, self.laid_out)
         self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self._imu = SampleCounter(s.mtx.rate_hz)  # for `feed_samples`
+        self._imu, self._first_samples = SampleCounter(s.mtx.rate_hz), FirstSamples()  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
         self._readings: list[BeaconReading] = []  # waiting for their segment
         self._meetings = MeetingQueue()
@@ -177,7 +178,12 @@ class Tracker:
         return self.take(portion_of([chunk]))
 
     def feed_samples(self, t_s: Floats, accel: Floats, gyro: Floats) -> list[Estimate]:
-        """Process any number of a foot IMU's samples: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame [`Settings.of_imu`]."""
+        """Process any number of a foot IMU's samples: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s, body frame [`Settings.of_imu`].
+
+        No estimate comes before the foot has stood. Raises EchostepError where the first samples are in other units or not in order, with the
+        factor, and for other shapes.
+        """
+        self._first_samples.add(t_s, accel, gyro)
         estimates = self._published(self.front_end.process_samples(self._imu.of(t_s, accel, gyro)))
         self.watch.advance()
         return estimates

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep_app.output.table import console
+from echostep_app.printing.lines import as_error
 from echostep_app.printing.picture_files import save_picture
 
 if TYPE_CHECKING:
@@ -73,10 +73,8 @@ def axes_of(rows: int, columns: int, inches: tuple[float, float]) -> tuple[Figur
 
 def save(figure: Figure, path: Path) -> None:
     """Write a PNG, and a PDF beside it, and print where; raises EchostepError when that is not possible."""
-    try:
+    with as_error(f"{path}: cannot write the picture"):
         path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the picture: {error.strerror}") from error
     beside = path.with_suffix(".pdf")
     for written in (path, beside):
         save_picture(figure, written, private=False)

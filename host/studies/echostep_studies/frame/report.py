@@ -16,7 +16,8 @@ from typing import Any, Protocol, TypeVar
 
 from msgspec import UNSET
 
-from echostep.errors import EchostepError
+from echostep.file_mode import keep_earlier
+from echostep_app.printing.lines import as_error
 from echostep_app.scorecard.error_statistics import error_statistics
 
 Row = dict[str, Any]  # the columns of a row by name: every summary row is one
@@ -103,11 +104,9 @@ def summary(name: str, profile: str, errors_m: Sequence[Sequence[float]], inside
 def write_json(path: Path, study: str, runs: int, seed: int, rows: Sequence[Mapping[str, Any]]) -> None:
     """`{study, runs, seed, rows}`; raises EchostepError when the file cannot be written."""
     text = json.dumps({"study": study, "runs": runs, "seed": seed, "rows": list(rows)}, indent=1)
-    try:
+    with as_error(f"{path}: cannot write the results"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text + "\n")
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write the results: {error.strerror}") from error
 
 
 def write_parquet(path: Path, rows: Sequence[Row]) -> None:
@@ -116,4 +115,5 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> None:
     import pyarrow.parquet
 
     columns = dict.fromkeys(key for row in rows for key in row)
-    pyarrow.parquet.write_table(pyarrow.table({key: [row.get(key) for row in rows] for key in columns}), path)
+    table = {key: [row.get(key) for row in rows] for key in columns}
+    pyarrow.parquet.write_table(pyarrow.table(table), keep_earlier(path))

@@ -6,13 +6,14 @@ In: a path. Out: one sentence; "" for an MCAP file. Owns nothing. The first byte
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from echostep.errors import replaced
+from echostep.errors import EchostepError, replaced
 from echostep.offline import imu_csv
 from echostep.offline.csv_table import LONGEST_LINE, UTF_16, header_of
 from echostep.ports.chunks import BOARD
-from echostep.recording import MCAP_MAGIC, port_of_bytes
+from echostep.recording import MCAP_MAGIC, SUFFIX, port_of_bytes
 from echostep_app.offline import leg_csv
 from echostep_app.printing.lines import as_error
 
@@ -39,6 +40,15 @@ TABLES = {  # columns that such a table has, and what it is
     ("x", "y"): "a track: echostep score FILE --truth TRUTH compares it with the truth",
 }
 MOST_NAMES = 12  # columns that are named
+
+
+def refuse_foreign(paths: Sequence[Path]) -> None:
+    """Raises EchostepError for a file that is named otherwise than recordings are, and is none."""
+    for path in paths:
+        if path.is_file() and path.suffix.casefold() != SUFFIX and (what := foreign(path)):
+            raise EchostepError(
+                f"{path}: no recording but {what}; echostep import {path} -o walk.mcap makes one of a foot's samples"
+            )
 
 
 def foreign(path: Path) -> str:

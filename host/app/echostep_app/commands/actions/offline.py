@@ -41,9 +41,9 @@ from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
 from echostep_app.recording.capture_summary import summary
-from echostep_app.recording.names import new_name
+from echostep_app.recording.names import link_newest, new_name
 from echostep_app.scorecard.truth import load_truth, truth_field
-from echostep_app.session.metadata import check_start, plan_of, start_given, version_metadata
+from echostep_app.session.metadata import check_start, plan_of, run_metadata, start_given, version_metadata
 from echostep_app.session.options import OutputOptions, TrackingOptions
 from echostep_app.session.results import output_folder
 from echostep_app.session.runs.replay import replay
@@ -55,10 +55,11 @@ SCALE_RANGE = (0.5, 2.0)  # of --scale: beyond it the lengths of the leg are wro
 
 
 def import_foot(
-    path: Path, out: Path, naming: Naming = OWN, beside: Beside | None = None, truth: Path | None = None
-) -> None:
-    """Make a recording of a foot IMU's file, with the true path in it where there is one."""
-    imu, about = _told(path, naming), version_metadata()
+    path: Path, out: Path, naming: Naming = OWN, beside: Beside | None = None, truth: Path | None = None,
+    about: dict[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Make a recording of a foot IMU's file, with the true path in it where there is one; `about`: its other metadata."""
+    imu, about = _told(path, naming), about or version_metadata()
     if truth is not None:
         field, words = truth_field(load_truth(truth, None), imu.t_s, path.name)
         about |= field
@@ -73,10 +74,14 @@ def foot_on_plan(
     """Track a foot IMU's file on a plan: the recording and its results go into the folder. A wrong plan or start leaves none."""
     tracking = TrackingOptions(plan, start)
     on = plan_of(tracking)
-    check_start(on, start_given(tracking, on), given=True)
+    given = start_given(tracking, on)
+    check_start(on, given, given=True)
+    begun = given or on.start
     output_folder(folder)
-    recording = new_name(folder / f"{path.stem}.mcap")
-    import_foot(path, recording, naming, truth=truth)
+    wanted = folder / f"{path.stem}.mcap"
+    recording = new_name(wanted)
+    import_foot(path, recording, naming, truth=truth, about=run_metadata(on, begun, 0, "") if begun else None)
+    link_newest(recording, wanted)
     replay([recording], tracking, None, OutputOptions(folder, terminal=False), on)
 
 

@@ -17,19 +17,21 @@ from rich.markup import escape
 
 from echostep.errors import EchostepError
 from echostep.plan import NO_PLAN, Plan
-from echostep.walk.walk import replay
+from echostep.recording import open_parts
+from echostep.walk.table import refuse_none
 from echostep_app.output.table import Table
 from echostep_app.plan.importers.limited import open_limited
-from echostep_app.printing.console import console_for_people
-from echostep_app.printing.lines import complain
+from echostep_app.printing.lines import complain, say
 from echostep_app.scorecard.card import Scorecard
 from echostep_app.scorecard.card import score as score_track
 from echostep_app.scorecard.definitions import METRICS, as_text, notes
 from echostep_app.scorecard.taps import tapped_walk
 from echostep_app.scorecard.track_columns import ScoredPath, load_path, track_of
 from echostep_app.scorecard.truth import is_recording, load_truth
+from echostep_app.session.losses import skipped
 from echostep_app.session.metadata import start_given
 from echostep_app.session.options import TrackingOptions
+from echostep_app.session.runs.replay import told_first, tracker_of
 
 
 class Compared(NamedTuple):
@@ -52,14 +54,12 @@ def score(
     """Print the scores as a table, or as JSON; `taps`: against the places that were tapped in each recording. Raises EchostepError."""
     plan = open_limited(tracking.plan_path) if tracking.plan_path else None
     compared = (_with_taps if taps else _with_truth)(tracks, truth, plan, tracking)
+    say(*([] if as_json else compared.words))
     cards = [score_track(track, true, plan, setup_s) for track, true in compared.pairs]
     if as_json:
         json.dump(_tree(cards, compared.truth, plan), sys.stdout, indent=1)
         sys.stdout.write("\n")
         return
-    console = console_for_people(highlight=False)
-    for line in compared.words:
-        console.print(line, markup=False)
     title = f"Scores against {Path(compared.truth).name}" + (f" on {plan.name}" if plan else "")
     _table(title, cards, _short_names(tracks)).print()
 
@@ -70,8 +70,10 @@ def _with_truth(tracks: Sequence[Path], truth: Path | None, plan: Plan | None, t
     if truth is None:
         raise EchostepError("the true path is missing: give it with --truth FILE, or score a recording that carries it")
     true = load_truth(truth, plan)
-    loaded = [_track(path, plan, tracking) for path in tracks]
-    return Compared(str(truth), [(track, true) for track in loaded], [one.described() for one in (true, *loaded)])
+    words: list[str] = []
+    loaded = [_track(path, plan, tracking, words) for path in tracks]
+    words += [one.described() for one in (true, *loaded)]
+    return Compared(str(truth), [(track, true) for track in loaded], words)
 
 
 def _with_taps(tracks: Sequence[Path], truth: Path | None, plan: Plan | None, tracking: TrackingOptions) -> Compared:
@@ -85,11 +87,17 @@ def _with_taps(tracks: Sequence[Path], truth: Path | None, plan: Plan | None, tr
     return Compared("taps", [(walk.track, walk.truth) for walk in walks], [walk.words for walk in walks])
 
 
-def _track(path: Path, plan: Plan | None, tracking: TrackingOptions) -> ScoredPath:
-    """A file's track, or that of a recording, which is tracked again."""
+def _track(path: Path, plan: Plan | None, tracking: TrackingOptions, words: list[str]) -> ScoredPath:
+    """A file's track, or that of a recording, which is tracked again; what replay tells of it is added to the words."""
     if not is_recording(path):
         return load_path(path, plan)
-    return track_of(replay(path, plan, start=start_given(tracking, plan or NO_PLAN)).estimates, str(path))
+    recording, on = open_parts([path]), plan or NO_PLAN
+    words += told_first(on, recording, tracking)
+    tracker = tracker_of(recording, on, tracking)
+    estimates = [e for portion in recording.portions() for e in tracker.take(portion)]
+    refuse_none(estimates, path)
+    words += skipped(recording, tracker.streams)
+    return track_of(estimates, str(path))
 
 
 def _short_names(paths: Sequence[Path]) -> list[str]:

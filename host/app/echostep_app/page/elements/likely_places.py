@@ -20,8 +20,7 @@ KEPT_S = 10.0  # for which the number of a place that no longer fits is given to
 
 def shown_places(estimate: Estimate) -> tuple[LikelyPlace, ...]:
     """The hypotheses that are listed and ringed: not a single one where the position, which has its ellipse, is claimed."""
-    is_position = len(estimate.hypotheses) == 1 and estimate.claims_place
-    return () if is_position else estimate.hypotheses
+    return () if estimate.is_one_place and estimate.claims_place else estimate.hypotheses
 
 
 class PlaceNumbers:

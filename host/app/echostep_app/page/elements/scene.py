@@ -23,6 +23,7 @@ from echostep_app.page.elements.marks import BeaconMark, ShownMeeting
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.scorecard.track_columns import ScoredPath
+from echostep_app.wearer.steady_status import elsewhere, fitting
 
 MOST_SHOWN = 10_000  # particles in a frame
 
@@ -98,12 +99,12 @@ def status_text(
         return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
     if estimate.plan_fits < PROBABLE:
         return "this plan does not fit: is it another building or floor, or mirrored?"
-    if estimate.status != TrackStatus.TRACKING and len(estimate.hypotheses) > 1:
-        return f"{estimate.status.value}: {len(estimate.hypotheses)} places fit; walk on, turn into a room{tap}"
+    if estimate.status != TrackStatus.TRACKING and estimate.hypotheses and not estimate.is_one_place:
+        return f"{estimate.status.value}: {fitting(estimate.hypotheses)}; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST and not no_plan:
         return "lost: walk along a wall or tap where you are" if accepts_taps else "lost"
     where = ", outside the building" if estimate.outside > PROBABLE else _height_words(estimate.z_m) if no_plan else ""
-    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}"
+    return f"{estimate.status.value}{where}, {format_metres(estimate.ellipse95.major_m)}{elsewhere(estimate)}"
 
 
 def _height_words(z_m: float) -> str:

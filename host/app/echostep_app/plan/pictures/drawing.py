@@ -7,10 +7,10 @@ In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,14 @@ BESIDE_RING_PT = (
 MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
+class Layer(NamedTuple):
+    """What is drawn on the levels, under their names: `draw` is called with the axes and the index of each. Its handles in the legend, the title."""
+
+    draw: Callable[[Any, int], None]
+    legend: Sequence[Any]
+    title: str
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """A rectangle of the map on paper. `points_m`: points (1/72 inch) per metre; `pixel_m`: metres per pixel."""
@@ -66,19 +74,19 @@ def draw_plan(
     Returns the letters of names that no installed font has.
     """
     check_picture(path)
-    with fonts_for(_texts(plan, levels)) as missing:
-        save_picture(_figure(plan, levels, bounds, findings), path, software=SOFTWARE, private=False)
+    with fonts_for(texts_of(plan, levels)) as missing:
+        save_picture(plan_figure(plan, levels, bounds, findings), path, software=SOFTWARE, private=False)
     return missing
 
 
 def plan_svg(plan: Plan) -> str:
     """All levels as SVG, for a notebook."""
     levels = range(len(plan.levels))
-    with fonts_for(_texts(plan, levels)):
-        return svg_text(_figure(plan, levels, None, ()))
+    with fonts_for(texts_of(plan, levels)):
+        return svg_text(plan_figure(plan, levels))
 
 
-def _texts(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
+def texts_of(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
     """All names on levels."""
     for i in levels:
         yield plan.levels[i].name
@@ -86,7 +94,10 @@ def _texts(plan: Plan, levels: Sequence[int]) -> Iterator[str]:
     yield from (connector.name for connector in plan.connectors)
 
 
-def _figure(plan: Plan, levels: Sequence[int], bounds: Bounds | None, findings: Sequence[PlanFinding]) -> Figure:
+def plan_figure(
+    plan: Plan, levels: Sequence[int], bounds: Bounds | None = None, findings: Sequence[PlanFinding] = (), layer: Layer | None = None
+) -> Figure:  # fmt: skip
+    """Levels side by side, all of them or the part within the bounds, with findings and a layer; call it within `fonts_for(texts_of(...))`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -106,7 +117,10 @@ def _figure(plan: Plan, levels: Sequence[int], bounds: Bounds | None, findings: 
     for number, i in enumerate(levels):
         drawn[i] = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(drawn[i], plan, i, view, [f for f in findings if f.level == i])
-    _draw_legend(figure, plan, levels)
+        if layer is not None:
+            layer.draw(drawn[i], i)
+            figure.suptitle(shown(layer.title), size=10, parse_math=False)
+    _draw_legend(figure, plan, levels, layer.legend if layer else ())
     layout.execute(figure)
     figure.set_layout_engine("none")
     for i, axes in drawn.items():
@@ -117,7 +131,7 @@ def _figure(plan: Plan, levels: Sequence[int], bounds: Bounds | None, findings: 
 
 def draw_bare_level(plan: Plan, level: int, bounds: Bounds, pixels_per_m: float, file: IO[bytes]) -> None:
     """Write a level within the bounds as PNG without frame, to the edge of the picture, on a transparent ground."""
-    with fonts_for(_texts(plan, [level])):
+    with fonts_for(texts_of(plan, [level])):
         _draw_bare(plan, level, bounds, pixels_per_m, file)
 
 
@@ -208,8 +222,8 @@ def _draw_names(axes: Any, plan: Plan, level_index: int, view: View, findings: S
         axes.title.set_text(f"{axes.title.get_text()} ({left_out} {what} not fit: --bounds shows a part larger)")
 
 
-def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int]) -> None:
-    """The legend below the picture: the colour of each kind that these levels have."""
+def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int], more: Sequence[Any]) -> None:
+    """The legend below the picture: the colour of each kind that these levels have, and `more`."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -225,8 +239,8 @@ def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int]) -> None:
         (Patch(color=WAY, alpha=0.3, label="stairs, lift, ramp"), ways),
         (Line2D([], [], color=WAY, marker=(3, 0, 0), linestyle="", label="start"), has_start),
     )
-    if handles := [handle for handle, is_drawn in kinds if is_drawn]:
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=7, frameon=False)
+    if handles := [*(handle for handle, is_drawn in kinds if is_drawn), *more]:
+        figure.legend(handles=handles, loc="outside lower center", ncols=8, fontsize=7, frameon=False)
 
 
 def _draw_start(axes: Any, start: Pose) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.file_mode import keep_earlier
 from echostep.plan import Plan
 from echostep_app.plan.cropping import Bounds, extent
 from echostep_app.plan.georeference import EarthTransform
@@ -49,7 +50,7 @@ def write_overlays(plan: Plan, out: Path) -> list[Overlay]:
     if out.suffix.casefold() != ".kmz":
         raise EchostepError(f"{out}: give a name that ends in .kmz")
     pictures = overlays(plan)
-    with as_error(f"{out}: cannot write the overlay"), zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+    with as_error(f"cannot write {out}"), zipfile.ZipFile(keep_earlier(out), "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo("doc.kml", EPOCH), _document(plan, pictures))
         for k, overlay in enumerate(pictures):
             archive.writestr(zipfile.ZipInfo(_file_name(k), EPOCH), overlay.png)

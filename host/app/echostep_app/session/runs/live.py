@@ -27,7 +27,7 @@ from echostep.tracker import Tracker
 from echostep.xsens.reader import warm_up
 from echostep_app.board.subscription import BoardSubscription
 from echostep_app.interruption import holding_signals, is_asked
-from echostep_app.kernel_parts import SEARCH
+from echostep_app.kernel_parts import SEARCH, TRACKING
 from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from echostep_app.ports.serial_ports import SerialPorts, check_different
 from echostep_app.ports.usb_number import usb_number
@@ -85,6 +85,8 @@ def _live(
     start = _last_start(output.folder, plan, number, settings) if is_last else start_given(tracking, plan)
     tracker = Tracker(plan, start, settings, seed)
     check_start(plan, tracker.start, given=tracking.start is not None and not is_last, recorded=is_last)
+    if early is None and not all(part.is_compiled for part in (*TRACKING, SEARCH)):
+        _open_ports(ports).close()  # a port that is missing or busy is told before a minute of compiling
     session = Session(tracker, "echostep live", "live", output, tracking.guide_to)
     session.prepare(SEARCH)  # a search may begin with the first steps
     folder = output_folder(output.folder)

@@ -42,14 +42,11 @@ def replay(
     """
     recording, plan = open_parts(paths), opened or plan_of(tracking)
     path = recording.path
-    if other := plan_note(plan, recording):
-        console.print(other, markup=False)
     truth = load_truth(truth_path, plan) if truth_path else recorded_truth(recording, plan)
     tracker = tracker_of(recording, plan, tracking)
     check_start(plan, tracker.start, given=tracking.start is not None, recorded="start_x_y_rad" in recording.metadata)
-    known = plan.start or tracking.start or {"start", "start_x_y_rad"} & recording.metadata.keys()
-    if plan.is_drawn and not known:
-        console.print("No start is known, so the walk is sought anywhere: --start X,Y,DEG gives it.")
+    for line in told_first(plan, recording, tracking):
+        console.print(line, markup=False)
     output_folder(output.folder)
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
@@ -76,6 +73,13 @@ def replay(
             console.print(line, markup=False, highlight=False)
         session.finish(path.name, elapsed_s)
         session.keep_page_open()
+
+
+def told_first(plan: Plan, recording: Recording, tracking: TrackingOptions) -> list[str]:
+    """What whoever tracks a recording is told before: that it is another plan, that no start is known."""
+    known = plan.start or tracking.start or {"start", "start_x_y_rad"} & recording.metadata.keys()
+    anywhere = "No start is known, so the walk is sought anywhere: --start X,Y,DEG gives it."
+    return [line for line in (plan_note(plan, recording), anywhere * (plan.is_drawn and not known)) if line]
 
 
 def plan_note(plan: Plan, recording: Recording) -> str:

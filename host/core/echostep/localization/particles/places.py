@@ -50,7 +50,7 @@ class _Particles(NamedTuple):
 
 
 def hypotheses(x_m: Floats, y_m: Floats, level: Ints, heading_rad: Floats, weight: Floats) -> tuple[LikelyPlace, ...]:
-    """At most MOST_PLACES likely places of particles (n,) with weights that sum to 1; each takes those near the heaviest square that is left."""
+    """At most MOST_PLACES likely places of particles (n,) by their weights; each takes those near the heaviest square that is left."""
     particles = _Particles(x_m, y_m, level, heading_rad, _squares(x_m, y_m, level))
     left = weight.copy()
     mass = np.asarray(np.bincount(particles.square, left), np.float64)
