@@ -19,10 +19,9 @@ ROTATION_ERROR = 0.02  # largest error of an element of R R^T and of the right-h
 IDENTITY = np.eye(3).ravel()
 _HALF = math.sqrt(0.5)
 TO_MAP = np.array([_HALF, 0.0, 0.0, _HALF])  # north, west, up -> east, north, up: a quarter turn about up
-FROM_WORLD = {  # ENU, NED or NWU -> north, west, up
+FROM_WORLD = {  # ENU or NED -> north, west, up
     ENU: np.array([_HALF, 0.0, 0.0, -_HALF]),
     NED: np.array([0.0, 1.0, 0.0, 0.0]),
-    NWU: np.array([1.0, 0.0, 0.0, 0.0]),
 }
 
 
