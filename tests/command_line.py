@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import itertools
 import os
@@ -48,6 +49,18 @@ def echostep(
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
     assert ends in (None, status), f"exit status {status}: {_text(out)}{_text(err)}"
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
+
+
+def fill_disk(monkeypatch: pytest.MonkeyPatch, most_bytes: int) -> None:
+    """No recording becomes longer from now on: the disk is full."""
+    write = os.write
+
+    def refused(file: int, data: bytes) -> int:
+        if Path(f"/proc/self/fd/{file}").readlink().suffix == ".mcap" and os.fstat(file).st_size > most_bytes:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", refused)
 
 
 def interrupt_once_called(

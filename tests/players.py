@@ -38,7 +38,8 @@ def pseudo_terminal() -> Iterator[tuple[int, str]]:
 
 
 @contextlib.contextmanager
-def _playing(step: Callable[[], None]) -> Iterator[None]:
+def playing(step: Callable[[], None]) -> Iterator[None]:
+    """Another thread makes one step after the other."""
     over = threading.Event()
 
     def play() -> None:
@@ -64,7 +65,7 @@ def babbling_port(sent: bytes) -> Iterator[str]:
                 os.write(ours, sent)
             time.sleep(0.1)
 
-        with _playing(step):
+        with playing(step):
             yield port
 
 
@@ -97,7 +98,7 @@ def python_board(shape: Callable[[NDArray[Any], int], None] = some_noise) -> Ite
             board.send(heard)
             time.sleep(0.001)
 
-        with _playing(step):
+        with playing(step):
             yield port
 
 
@@ -116,7 +117,7 @@ def twin_board(*faults: str, rows: Callable[[int], NDArray[Any]] = quiet_rows) -
         time.sleep(max(0.0, due_s - time.monotonic()))
 
     try:
-        with _playing(step):
+        with playing(step):
             yield str(board.port)
     finally:
         board.close()

@@ -62,11 +62,6 @@ def test_a_wall_to_the_left_is_heard_at_its_distance(distance_m: float) -> None:
     assert ranges(listen(wall, heading_deg=180.0)) == pytest.approx((0.0, distance_m), abs=1e-3)
 
 
-def test_a_slanted_wall_is_heard_at_the_foot_of_the_perpendicular() -> None:
-    slanted = [[-5.0, 2.0 - 5.0 * math.tan(math.radians(15.0)), 5.0, 2.0 + 5.0 * math.tan(math.radians(15.0))]]
-    assert ranges(listen(slanted))[0] == pytest.approx(2.0 * math.cos(math.radians(15.0)), abs=1e-3)
-
-
 def test_a_wall_out_of_the_cone_is_silent() -> None:
     wall = [[-9.0, 2.0, 9.0, 2.0]]
     for turn in (-20.0, 0.0, 20.0):
@@ -88,13 +83,6 @@ def test_the_cone_is_narrower_far_away() -> None:
 
 def test_the_nearest_of_two_walls_wins_and_hides_the_other() -> None:
     assert ranges(listen([[-5.0, 3.0, 5.0, 3.0], [-2.0, 1.5, 2.0, 1.5]]))[0] == pytest.approx(1.5, abs=1e-3)
-
-
-def test_a_wall_is_heard_through_the_gap_of_a_door() -> None:
-    door = [[-5.0, 1.5, -1.2, 1.5], [1.2, 1.5, 5.0, 1.5], [-5.0, 3.0, 5.0, 3.0]]
-    assert ranges(listen(door))[0] == pytest.approx(3.0, abs=1e-3)
-    shut = [*door, [-1.2, 1.5, 1.2, 1.5]]
-    assert ranges(listen(shut))[0] == pytest.approx(1.5, abs=1e-3)
 
 
 def test_a_near_edge_answers_from_its_own_distance() -> None:
@@ -138,11 +126,6 @@ def test_parallel_walls_pass_a_ping_to_the_other_ranger() -> None:
     assert not listen([corridor[0], [-5.0, -0.6, -0.5, -0.6]]).cross_us.any()
     wide = [[-5.0, 3.5, 5.0, 3.5], [-5.0, -3.5, 5.0, -3.5]]
     assert not listen(wide).cross_us.any()
-
-
-def test_a_corridor_of_two_metres_passes_pings_to_the_other_ranger() -> None:
-    found = listen([[-5.0, 1.0, 5.0, 1.0], [-5.0, -0.8, 5.0, -0.8]])
-    assert np.allclose(found.cross_us[0] * 0.5e-6 * SPEED_M_S, 1.8, atol=1e-3)
 
 
 def test_a_corner_sends_the_ping_back_from_its_apex() -> None:

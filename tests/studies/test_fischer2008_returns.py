@@ -16,7 +16,7 @@ from command_line import echostep
 from echostep_simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
 from echostep_studies.fischer2008.paper_fusion import FUSION, fuse
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, guided_return
-from echostep_studies.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_batch, one_return, wilson95
+from echostep_studies.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_return, wilson95
 
 
 def test_source_turns_the_heading_once_by_the_side_of_approach() -> None:
@@ -105,14 +105,6 @@ def test_the_cases_have_names_of_their_own() -> None:
 
 
 @pytest.mark.long
-def test_every_row_has_its_share_of_returns() -> None:
-    names = [case.name for case in cases()]
-    rows = one_batch(0, first=1, runs=1)
-    assert [row.name for row in rows] == names
-    assert all(row.runs == 1 for row in rows)
-
-
-@pytest.mark.long
 def test_command_writes_rows_and_a_picture(tmp_path: Path) -> None:
     arguments = [
         "evaluate",
@@ -126,6 +118,7 @@ def test_command_writes_rows_and_a_picture(tmp_path: Path) -> None:
     ]
     echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "200"}, ends=0)
     rows = json.loads((tmp_path / "rows.json").read_text())["rows"]
+    assert [row["name"] for row in rows] == [case.name for case in cases()]
     assert all(set(row) == {"name", "success", "low95", "high95", "runs"} for row in rows)
     assert all(0.0 <= row["low95"] <= row["success"] <= row["high95"] <= 1.0 for row in rows)
     assert (tmp_path / "out" / "sweeps.png").stat().st_size > 10_000

@@ -65,11 +65,6 @@ def test_on_real_feet_the_toe_looks_where_they_walk() -> None:
             assert abs(np.median(travel)) < math.radians(20.0), (recording.group, recording.name)
 
 
-def bent(gyro: Floats, limit_rad_s: float) -> Floats:
-    """A reading that follows the rate and bends off within a few percent of the limit, never twice at one value."""
-    return np.asarray(gyro * (1.0 + (np.abs(gyro) / limit_rad_s) ** 24) ** (-1 / 24))
-
-
 def outbound_m(recording: FootRecording) -> float:
     """Length of the way out of an MTw's recording, by the track."""
     return recording.judge(track_of(recording))[0].value
@@ -80,7 +75,7 @@ def outbound_m(recording: FootRecording) -> float:
 def test_real_walks_with_a_lower_limit_keep_their_length() -> None:
     """MTw gyros reach 1200 deg/s. Bent off at 480 deg/s, the way out changes by 0.12 m on average; by 0.39 m without the correction."""
     recordings = [recording for recording in recordings_in(DATA, SETS) if recording.group == "mtw"]
-    limited = [replace(r, gyro=bent(r.gyro, np.radians(480.0))) for r in recordings]
+    limited = [replace(r, gyro=fw.bent(r.gyro, np.radians(480.0))) for r in recordings]
     errors = [abs(outbound_m(a) - outbound_m(b)) for a, b in zip(recordings, limited, strict=True)]
     assert np.mean(errors) < 0.2
 
@@ -88,23 +83,19 @@ def test_real_walks_with_a_lower_limit_keep_their_length() -> None:
 LEG_M = 76.0  # way of the legs of `legs_qmt`, by both feet
 
 
-def doubts_of(track: Track) -> str:
-    return "; ".join(track.steps[-1].doubts())
-
-
 @needs_data("legs_qmt")
 @pytest.mark.parametrize("segment", ["lower_leg_left", "lower_leg_right", "upper_leg_left", "upper_leg_right"])
 def test_real_legs_are_told(segment: str) -> None:
     track = real(segment)
     length_m = sum(math.hypot(*step.move_m[:2]) for step in track.steps)
-    assert "does not rest while the foot stands" in doubts_of(track)
+    assert "does not rest while the foot stands" in fw.doubts_of(track)
     assert LEG_M - length_m < 3.1 * track.steps[-1].scale_sd * length_m
 
 
 @needs_data("legs_qmt")
 def test_the_feet_of_the_same_walk_are_not() -> None:
     for segment in ("foot_left", "foot_right"):
-        assert "does not rest" not in doubts_of(real(segment))
+        assert "does not rest" not in fw.doubts_of(real(segment))
 
 
 @needs_data("vicon_pyshoe")

@@ -14,7 +14,7 @@ from echostep.board.reports import SUBSCRIBE, BoardReports
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.tracker import Tracker
-from echostep_app.board.faults.health import Severity, board_findings, expected_rates, gyro_celsius, rate_findings
+from echostep_app.board.faults.health import Severity, board_findings, expected_rates, rate_findings
 from echostep_app.board.subscription import BoardSubscription
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board
 from echostep_app.commissioning.probe import ProbeResult
@@ -130,10 +130,6 @@ def test_maxsonars_are_expected_to_ping_less_often() -> None:
     assert [f.severity for f in rate_findings(heard, expected_rates(heard) | {"Ping": 9.0})] == [Severity.FAULT]
 
 
-def test_temperature_of_a_gyro() -> None:
-    assert gyro_celsius(m.GyroHealth(0, 0, -34, 2, 0, 0)) == pytest.approx(20.06, abs=0.01)
-
-
 def test_the_live_view_says_it_too() -> None:
     plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
     tracker = Tracker(plan)
@@ -162,31 +158,24 @@ IDENTITY = m.Identity(0, m.SCHEMA_HASH, 1, 2, 0, m.ResetCause.POWER_ON)
 HEALTH = m.BoardHealth(0, 5_000, 4_980, 1, 0, m.CrashPlace.NONE, 0, 0)
 
 
-def texts_of(*heard: m.Message) -> list[str]:
-    reports = BoardReports()
-    for message in heard:
-        reports.add(message)
-    return [str(finding) for finding in board_findings(reports)]
-
-
 def test_a_board_that_is_well_is_no_finding() -> None:
-    assert texts_of(IDENTITY, HEALTH) == []
-    assert texts_of(IDENTITY, HEALTH._replace(supply_mv=0, supply_least_mv=0)) == []  # not measured yet
+    assert texts(words(IDENTITY, HEALTH)) == []
+    assert texts(words(IDENTITY, HEALTH._replace(supply_mv=0, supply_least_mv=0))) == []  # not measured yet
 
 
 def test_a_crash_says_where_it_was() -> None:
     crashed = HEALTH._replace(starts=3, crashes=2, crash_place=m.CrashPlace.GYROS, crash_address=0x1380)
     for cause in (m.ResetCause.WATCHDOG, m.ResetCause.EXTERNAL):  # the button does not hide it
-        (text,) = texts_of(IDENTITY._replace(reset_cause=cause), crashed)
+        (text,) = texts(words(IDENTITY._replace(reset_cause=cause), crashed))
         assert "2 times since it got power, last in gyros, address 0x2700" in text
-    (text,) = texts_of(IDENTITY._replace(reset_cause=m.ResetCause.WATCHDOG))  # older firmware
+    (text,) = texts(words(IDENTITY._replace(reset_cause=m.ResetCause.WATCHDOG)))  # older firmware
     assert text.startswith("board: was restarted by its watchdog; ")
 
 
-@pytest.mark.parametrize(("least_mv", "words"), [(4_700, ""), (4_500, "sagged to 4.50 V"), (4_000, "needs 4.5 V")])
-def test_a_supply_that_sags(least_mv: int, words: str) -> None:
-    found = texts_of(IDENTITY, HEALTH, HEALTH._replace(supply_least_mv=least_mv))
-    assert [words in text for text in found] == ([True] if words else [])
+@pytest.mark.parametrize(("least_mv", "said"), [(4_700, ""), (4_500, "sagged to 4.50 V"), (4_000, "needs 4.5 V")])
+def test_a_supply_that_sags(least_mv: int, said: str) -> None:
+    found = texts(words(IDENTITY, HEALTH, HEALTH._replace(supply_least_mv=least_mv)))
+    assert [said in text for text in found] == ([True] if said else [])
 
 
 def test_a_board_is_asked_once_and_again_after_a_restart() -> None:

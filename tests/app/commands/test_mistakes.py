@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import signal
@@ -19,7 +18,7 @@ from cryptography.hazmat.primitives.serialization import BestAvailableEncryption
 from cryptography.hazmat.primitives.serialization.pkcs12 import serialize_key_and_certificates
 
 from board_runs import ROOT
-from command_line import echostep, interrupt_once_called
+from command_line import echostep, fill_disk, interrupt_once_called
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep_app.printing.console import print_notices
@@ -142,14 +141,7 @@ def other_name(folder: Path, _patch: pytest.MonkeyPatch) -> dict[str, str]:
 
 
 def disk_full(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
-    write = os.write
-
-    def refused(file: int, data: bytes) -> int:
-        if Path(f"/proc/self/fd/{file}").readlink().suffix == ".mcap" and os.fstat(file).st_size > 1_000:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return write(file, data)
-
-    patch.setattr(os, "write", refused)
+    fill_disk(patch, 1_000)
     interrupt_once_called(BackgroundWriter, "_write_to_file", patch, lambda writer, *_: writer.failed)
     patch.setattr("echostep_app.recording.background_writer.CLOSE_S", 0.5)
     with python_board() as port:

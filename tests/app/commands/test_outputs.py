@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import os
 import signal
@@ -18,7 +17,7 @@ from unittest import mock
 import pytest
 from mcap.reader import make_reader
 
-from command_line import PROGRAM, echostep, interrupt_once_called
+from command_line import PROGRAM, echostep, fill_disk, interrupt_once_called
 from echostep.recording import open_recording
 from echostep_app.cli import main
 from echostep_app.operation.session import TableFeed
@@ -128,14 +127,7 @@ def test_a_command_whose_result_is_lost_has_status_2() -> None:
 @pytest.fixture
 def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """No recording becomes longer than a few kilobytes."""
-    write = os.write
-
-    def refused(file: int, data: bytes) -> int:
-        if Path(f"/proc/self/fd/{file}").readlink().suffix == ".mcap" and os.fstat(file).st_size > 100:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return write(file, data)
-
-    monkeypatch.setattr(os, "write", refused)
+    fill_disk(monkeypatch, 100)
     monkeypatch.setattr(background_writer, "RETRY_S", 0.05)
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import importlib
 import io
 import math
-import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +21,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rich.console import Console
 
-import players  # noqa: F401  puts the twin's player on the path
 from board_runs import ELF, TWIN, needs_twin
 from command_line import echostep
 from echostep.board import messages as m
@@ -38,8 +37,8 @@ from echostep_app.commissioning.poses import TRIES, measure_poses
 from echostep_app.commissioning.probe import ProbeResult, _Probe
 from echostep_simulation.devices.board import BoardProcess
 from echostep_studies.simulation.devices.rehearsal import LyingParts
+from players import playing
 from snapshots import expect, refusal
-from waiting import PATIENCE_S
 
 G = 9.81
 SIDES = np.vstack([np.eye(3), -np.eye(3)])
@@ -188,20 +187,13 @@ def test_the_foots_samples_are_corrected() -> None:
 def foot_on_a_pseudo_terminal() -> Iterator[Any]:
     """A foot board in real time."""
     made = importlib.import_module("twin.run").LyingBoard(3, foot=True)
-    over = threading.Event()
 
-    def play() -> None:
-        while not over.wait(0.005):
-            made.advance()
+    def step() -> None:
+        made.advance()
+        time.sleep(0.005)
 
-    thread = threading.Thread(target=play)
-    thread.start()
-    try:
+    with closing(made.board), playing(step):
         yield made
-    finally:
-        over.set()
-        thread.join(timeout=PATIENCE_S)
-        made.board.close()
 
 
 @pytest.mark.long

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.cli import app
-from echostep_app.offline.floors.floor_table import checked_heights, find_levels, parse_heights, visits
+from echostep_app.offline.floors.floor_table import checked_heights, parse_heights
 from echostep_app.offline.floors.floors import Floors, record_floors
 from echostep_app.offline.floors.pressure_csv import Pressures, load_pressures
 from echostep_app.offline.floors.stays import height_record, heights_by_pressure, noise_m
@@ -154,26 +154,6 @@ def test_the_command_tells_floors_and_stays(tmp_path: Path) -> None:
     assert [line.split(",")[1] for line in (lines[1], lines[-1])] == ["0", "1"]
     assert "height / m" in picture.read_text()
     assert f"floors: {out}, picture: {picture}" in result.output
-
-
-def test_the_storeys_are_found() -> None:
-    way = np.concatenate([stairs_up(), 3.5 + stairs_up()[540:], 7.0 - stairs_up()[540:], 3.5 - stairs_up()[540:]])
-    samples = record(way)
-    found = height_record(samples)
-    heights_m = find_levels(found, "")
-    assert heights_m == pytest.approx([0.0, 3.5, 7.0], abs=0.3)
-    floors = record_floors(samples.t_s, found, heights_m)
-    assert [visit.floor for visit in visits(floors, found)] == [0, 1, 2, 1, 0]
-    with pytest.raises(EchostepError, match=r"a\.csv: heights: the record shows one storey only"):
-        find_levels(height_record(record(np.zeros(900))), "a.csv")
-
-
-@pytest.mark.parametrize("rate_hz", [0.5, 2.0, 50.0])
-def test_any_rate(rate_hz: float) -> None:
-    way = stairs_up(rate_hz)
-    found = floors_of(record(way, rate_hz, noise_pa=1.5), np.array([0.0, 3.5]))
-    assert ((found.floor == (way > 1.75)) | (np.abs(way - 1.75) < 0.25)).mean() > 0.97
-    assert len(found.t_s) == len(way)
 
 
 @pytest.mark.parametrize(

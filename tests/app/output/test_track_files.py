@@ -21,7 +21,7 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, LikelyPlace, TrackStatus
 from echostep.plan import load_plan
-from echostep.recording import clock_of, open_recording
+from echostep.recording import open_recording
 from echostep.walk.table import write_track
 from echostep_app.output.map_files import TrackOnPlan
 from echostep_app.output.track_files import FORMATS
@@ -187,11 +187,6 @@ def test_a_track_on_a_map_has_times(folder: Path, estimates: list[Estimate]) -> 
     began_s = datetime.fromisoformat(clock["started_utc"]).timestamp()
     assert np.abs(np.diff(seconds) - np.diff([e.t_s for e in estimates])).max() < 0.02
     assert abs(seconds[0] - began_s - estimates[0].t_s) < 0.1
-
-
-@pytest.mark.parametrize("damaged", [{}, {"started_utc": "soon", "started_ns": "1"}, {"started_utc": "2026-11-21"}])
-def test_a_recording_without_a_usable_clock_has_none(damaged: dict[str, str]) -> None:
-    assert clock_of(damaged) is None
 
 
 def test_each_estimate_is_a_row_with_its_hypotheses(tmp_path: Path) -> None:

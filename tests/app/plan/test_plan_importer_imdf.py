@@ -92,10 +92,6 @@ def mall(tmp_path: Path) -> Plan:
     return import_plan(folder(tmp_path / "mall", files()))
 
 
-def test_a_zip_is_a_folder(mall: Plan, tmp_path: Path) -> None:
-    assert import_plan(zipped(tmp_path / "mall.zip", files())).digest == mall.digest
-
-
 def test_what_becomes_of_a_mall(mall: Plan) -> None:
     assert (mall.name, [(level.name, level.height_m) for level in mall.levels]) == (
         "Mall",

@@ -19,7 +19,6 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
 from command_line import echostep
-from echostep.errors import EchostepError
 from echostep.ports.chunks import LATEST_NS, Chunk
 from echostep.recording import open_recording
 from echostep.recording.mcap_records import RECORD_LIMIT, decompress_chunk, port_of
@@ -39,14 +38,6 @@ def write(path: Path, chunks: list[Chunk] = CHUNKS) -> bytes:
         for chunk in chunks:
             recorder.write(chunk)
     return path.read_bytes()
-
-
-def test_round_trip(tmp_path: Path) -> None:
-    write(tmp_path / "a.mcap")
-    recording = open_recording(tmp_path / "a.mcap")
-    assert recording.metadata == {"seed": "4", "note": "a test"}
-    assert list(recording.chunks()) == CHUNKS
-    assert not recording.own_damage.truncated
 
 
 @given(st.data())
@@ -135,21 +126,6 @@ def test_a_source_that_can_wait_is_never_more_than_half_a_second_ahead_of_the_fi
     assert found == CHUNKS[: len(found)]
     assert CHUNKS[-1].t_arrival_ns - found[-1].t_arrival_ns <= 500_000_000
     recorder.close()
-
-
-def test_who_does_not_wait_finds_everything_in_the_file_a_moment_later(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "a.mcap", {})
-    for chunk in CHUNKS:
-        recorder.write(chunk)
-    assert until(lambda: kept_chunks(tmp_path / "a.mcap") == CHUNKS)
-    recorder.close()
-
-
-def kept_chunks(path: Path) -> list[Chunk]:
-    """What is in a file by now, which may be nothing."""
-    with contextlib.suppress(EchostepError):
-        return list(open_recording(path).chunks())
-    return []
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))

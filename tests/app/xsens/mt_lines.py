@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-import threading
 import time
-import tty
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,6 +14,7 @@ from echostep.xsens import MtSample
 from echostep_app.xsens.requests import project_requests
 from echostep_app.xsens.setup import MtxSetup
 from echostep_studies.simulation.devices.mtx_setup import MtxDevice
+from players import playing, pseudo_terminal
 
 SAMPLE = MtSample(7, (0.5, -0.25, 9.75), (0.125, 0.0, -1.5), (0.5, 0.0, -0.875), (0.5, 0.5, -0.5, 0.5))
 STILL = MtSample(0, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.5, 0.0, -0.875), (1.0, 0.0, 0.0, 0.0))
@@ -49,14 +48,11 @@ class Line:
 @contextlib.contextmanager
 def on_a_terminal(device: MtxDevice) -> Iterator[str]:
     """A device that measures at its rate and answers, on a pseudo terminal; gives the port's name."""
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    os.set_blocking(ours, False)
-    stop = threading.Event()
+    counter, due_s = 0, time.monotonic()
+    with pseudo_terminal() as (ours, port):
 
-    def live() -> None:
-        counter, due_s = 0, time.monotonic()
-        while not stop.is_set():
+        def step() -> None:
+            nonlocal counter, due_s
             received = b""
             with contextlib.suppress(BlockingIOError):
                 received = os.read(ours, 4096)
@@ -70,12 +66,5 @@ def on_a_terminal(device: MtxDevice) -> Iterator[str]:
                 os.write(ours, sent)
             time.sleep(0.001)
 
-    thread = threading.Thread(target=live)
-    thread.start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        stop.set()
-        thread.join()
-        os.close(ours)
-        os.close(theirs)
+        with playing(step):
+            yield port

@@ -13,7 +13,6 @@ import pytest
 
 from beacons.beacon_walk import SEED, Walk, beacon_walk, demo
 from echostep.angles import mean_angle
-from echostep.beacons.beliefs import BeaconBeliefs, moments
 from echostep.localization import Start, digest
 from echostep.localization.belief import CloudHypothesis
 from echostep.plan import Pose
@@ -100,19 +99,6 @@ def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> 
     assert states_at_the_end(there_and_back, 19.0) == {1: "well", 2: "silent", 3: "well"}
     into_the_corner = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.6), (11.6, 9.4, 12.0), (11.7, 9.5))
     assert states_at_the_end(into_the_corner, math.inf) == {1: "well", 2: "well", 3: "well"}
-
-
-def test_moments_are_those_of_the_mixture() -> None:
-    rng = np.random.default_rng(SEED)
-    n, b = 500, 3
-    beliefs = BeaconBeliefs(rng.normal(40.0, 2.0, (n, b, 3)), rng.uniform(0.1, 1.0, (n, b, 6)), np.zeros((n, b)))
-    weight = rng.uniform(size=n)
-    weight /= weight.sum()
-    for k, (x, y, sd, axis) in enumerate(moments(beliefs, weight)):
-        m, c = beliefs.mean[:, k], beliefs.cov[:, k]
-        assert (x, y) == pytest.approx((weight @ m[:, 0], weight @ m[:, 1]))
-        assert 2.0 * sd**2 == pytest.approx(weight @ ((m[:, 0] - x) ** 2 + (m[:, 1] - y) ** 2 + c[:, 0] + c[:, 3]))
-        assert axis == pytest.approx(math.atan2(weight @ np.sin(m[:, 2]), weight @ np.cos(m[:, 2])))
 
 
 @pytest.mark.slow

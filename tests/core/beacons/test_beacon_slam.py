@@ -26,7 +26,6 @@ from echostep.beacons.slam import (
     SUSPECT,
     TIMES_MOVED,
     initial_health,
-    propose_heading_jumps,
     reweight,
     update_by_measurement,
 )
@@ -63,24 +62,6 @@ def weigh(
 def ring(n: int, radius_m: float) -> tuple[Floats, Floats]:
     angle = np.linspace(-math.pi, math.pi, n, endpoint=False)
     return radius_m * np.cos(angle), radius_m * np.sin(angle)
-
-
-def test_range_prefers_particles_at_that_distance() -> None:
-    x, y = np.linspace(1.0, 6.0, 51), np.zeros(51)
-    weight, beliefs = np.zeros(51), empty_beliefs(51, 1)
-    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    fit, size = weigh(x, y, weight, beliefs, 3.0, math.nan)
-    assert abs(x[weight.argmax()] - 3.0) < 0.06
-    assert 0.0 < fit < 1.0
-    assert 1.0 < size < 51.0
-
-
-def test_bearing_prefers_particles_on_that_side() -> None:
-    x, y = ring(72, 3.0)
-    weight, beliefs = np.zeros(72), empty_beliefs(72, 1)
-    set_beliefs(beliefs, 0, 0.0, 0.0, math.radians(40.0), 0.0, 0.0)
-    weigh(x, y, weight, beliefs, 3.0, math.radians(50.0))
-    assert abs(math.atan2(y[weight.argmax()], x[weight.argmax()]) - math.radians(90.0)) < 0.1
 
 
 def test_outlier_costs_no_particle_its_life() -> None:
@@ -162,15 +143,6 @@ def test_moved_beacon_is_noticed_while_others_vouch_for_the_cloud() -> None:
     assert np.hypot(x.mean(), y.mean()) < 0.1
 
 
-def test_kick_prices_what_it_tries() -> None:
-    turn, weight = np.zeros(10_000), np.zeros(10_000)
-    propose_heading_jumps(turn, weight, 0.2, MODEL, np.random.default_rng(3))
-    kicked = turn != 0.0
-    assert abs(kicked.mean() - 0.2 * MODEL.tries_per_m) < 0.02
-    assert np.allclose(weight[kicked], math.log(MODEL.kick_per_m / MODEL.tries_per_m))
-    assert (weight[~kicked] == 0.0).all()
-
-
 @given(
     st.floats(0.0, 1e6), st.floats(-10.0, 10.0), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(0.0, 1e4), st.floats(0.0, 20.0)
 )  # fmt: skip
@@ -197,20 +169,6 @@ def test_beacon_that_was_moved_costs_no_more_than_a_moved_one_and_is_trusted_aga
     assert beliefs.doubt[0, 0] < math.exp(8.0)
     trust = [weigh(*at, weight, beliefs, 4.0, math.nan)[0] for _ in range(10)]
     assert trust[-1] > 0.95
-
-
-def test_first_bearing_ties_the_axis_to_the_place() -> None:
-    """The place is uncertain across the line of sight: whoever then learns that the beacon lies to the left learns that its axis is another."""
-    beliefs, weight = empty_beliefs(1, 1), np.zeros(1)
-    set_beliefs(beliefs, 0, 0.0, 0.0, 0.0, 1.0, math.pi**2)
-    weigh(np.full(1, 5.0), np.zeros(1), weight, beliefs, 5.0, 0.3)
-    axis = beliefs.mean[0, 0, 2]
-    assert abs(axis + 0.3) < 0.1
-    for _ in range(20):
-        weigh(np.zeros(1), np.full(1, -5.0), weight, beliefs, 6.0, math.nan)
-    assert abs(beliefs.mean[0, 0, 1] - 0.9) < 0.2
-    seen = math.atan2(-beliefs.mean[0, 0, 1], 5.0)
-    assert abs(beliefs.mean[0, 0, 2] - (seen - 0.3)) < 0.06
 
 
 def found_moved(plan_supports: bool) -> tuple[Beacons, Floats]:

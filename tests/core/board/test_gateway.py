@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.beacons.initialisation import locate_beacon
 from echostep.board.frames import encode
 from echostep.board.gateway import MOST_BEACONS, NEW_CLOCK_MESSAGES, Gateway
 from echostep.board.messages import Beacon, Identity
@@ -101,18 +100,6 @@ def test_any_bytes_leave_the_next_word_readable(noise: list[bytes]) -> None:
         gateway.read(part, 10.0)
     gateway.read(b"\0", 10.0)
     assert len(said(gateway, GOOD)) == 1
-
-
-def test_a_beacon_is_placed_by_a_way_past_it() -> None:
-    world = BeaconWorld(np.array([[3.0, 2.0, 0.4]]), np.zeros((0, 4)))
-    rng = np.random.default_rng(1)
-    rows = [(x, 0.0, r, b) for x in np.arange(0.0, 7.0, 0.2) for _, r, b in heard_at(world, float(x), 0.0, rng)]
-    found = locate_beacon(np.array(rows))
-    assert found.sure
-    assert found[:2] == pytest.approx((3.0, 2.0), abs=0.3)
-    assert not locate_beacon(np.array(rows[:8])).sure
-    ranges_only = np.array([(x, y, r, math.nan) for x, y, r, _ in rows])
-    assert not locate_beacon(ranges_only).sure  # it may as well lie on the other side
 
 
 def test_walls_hide_beacons() -> None:

@@ -24,6 +24,15 @@ def any_rotation(rng: np.random.Generator) -> Floats:
 Samples = tuple[Floats, Floats, Floats]
 
 
+def bent(gyro: Floats, limit_rad_s: float) -> Floats:
+    """A reading that follows the rate and bends off within a few percent of the limit, never twice at one value."""
+    return np.asarray(gyro * (1.0 + (np.abs(gyro) / limit_rad_s) ** 24) ** (-1 / 24))
+
+
+def doubts_of(track: Track) -> str:
+    return "; ".join(track.steps[-1].doubts())
+
+
 def moves(track: Track) -> Floats:
     return np.array([step.move_m for step in track.steps])
 

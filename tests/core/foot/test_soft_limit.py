@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from echostep.arrays import Floats
 from echostep.foot import soft_limit, stance
 from echostep.foot.steps import walk_track
 from echostep.jit import lean_kernel
@@ -18,11 +17,6 @@ QUICK_LAPS = fw.FootManner((1.2, 0.0, 0.0), turn_rad=0.35, swing_s=0.55, stance_
 STEPS = 40
 
 
-def bent(gyro: Floats, limit_rad_s: float) -> Floats:
-    """A reading that follows the rate and bends off within a few percent of the limit, never twice at one value."""
-    return np.asarray(gyro * (1.0 + (np.abs(gyro) / limit_rad_s) ** 24) ** (-1 / 24))
-
-
 @pytest.mark.parametrize("rate_hz", [100, 200])
 @pytest.mark.parametrize("name", ["quick laps", "walking"])
 def test_a_soft_limit_costs_a_percent_and_no_step(name: str, rate_hz: int) -> None:
@@ -30,7 +24,7 @@ def test_a_soft_limit_costs_a_percent_and_no_step(name: str, rate_hz: int) -> No
     manner = QUICK_LAPS if name == "quick laps" else fw.MANNERS["walking"]
     course = fw.course(manner, STEPS)
     t, accel, gyro = fw.samples(course, rate_hz, rng=np.random.default_rng(1))
-    track = walk_track(t, accel, bent(gyro, 0.8 * float(np.abs(gyro).max())))
+    track = walk_track(t, accel, fw.bent(gyro, 0.8 * float(np.abs(gyro).max())))
     assert len(track.steps) == STEPS
     assert track.counts.saturated > 5 * STEPS
     way = sum(float(np.hypot(*step.move_m[:2])) for step in track.steps)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.foot.steps import Track, walk_track
+from echostep.foot.steps import walk_track
 from echostep.foot.trunk_path import KNOWN_SCALE_SD, GaitSettings, TrunkPath
 from echostep.localization.settings import CloudSettings
 from echostep.offline.imu_checks import contradiction, end_sd_m
@@ -39,10 +39,6 @@ def flat_walk(**changed: float) -> fw.FootManner:
     return fw.FootManner((STRIDE_M, 0.0, 0.0), toe_off_rad=0.0, heel_strike_rad=0.0, **changed)
 
 
-def doubts_of(track: Track) -> str:
-    return "; ".join(track.steps[-1].doubts())
-
-
 @pytest.mark.parametrize("lever_m", [0.13, 0.28, 0.4])
 @pytest.mark.parametrize("noise", [0.0, 0.3])
 @pytest.mark.parametrize("stance_s", [0.4, 0.6])
@@ -53,7 +49,7 @@ def test_a_sensor_on_the_shank_is_told_and_its_deviation_covers_the_error(
     t, accel, gyro = fw.samples(shank(lever_m, flat_walk(stance_s=stance_s)), 100, fw.any_rotation(rng), rng)
     track = walk_track(t, accel + noise * rng.standard_normal(accel.shape), gyro)
     error_m = np.hypot(*(track.position_m[-1] - track.position_m[0])[:2]) - STEPS * STRIDE_M
-    assert "does not rest while the foot stands" in doubts_of(track)
+    assert "does not rest while the foot stands" in fw.doubts_of(track)
     assert abs(error_m) < 2.0 * end_sd_m(track)
 
 
@@ -68,7 +64,7 @@ def test_no_manner_of_walking_is_taken_for_a_leg(manner: str) -> None:
     course = fw.course(fw.MANNERS[manner], STEPS, np.random.default_rng(4))
     track = walk_track(*fw.samples(course, 100, rng=np.random.default_rng(5)))
     assert max(step.unrest for step in track.steps) < 0.9
-    assert doubts_of(track) == ""
+    assert fw.doubts_of(track) == ""
 
 
 @pytest.mark.parametrize("scale", [0.85, 0.92, 0.97, 0.99, 1.01, 1.03, 1.08, 1.2])
@@ -78,7 +74,7 @@ def test_a_rest_that_is_not_one_g_is_told_and_covered(scale: float) -> None:
     track = walk_track(t, scale * accel, gyro)
     error_m = np.hypot(*track.position_m[-1, :2]) - course.prints_m[-1, 0]
     assert abs(error_m) < 2.0 * end_sd_m(track)
-    assert ("the accelerometer shows" in doubts_of(track)) == (abs(scale - 1.0) > 0.02)
+    assert ("the accelerometer shows" in fw.doubts_of(track)) == (abs(scale - 1.0) > 0.02)
 
 
 def test_the_trunks_path_states_the_same_deviation_once() -> None:

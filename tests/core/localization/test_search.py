@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from echostep.echoes.range_table import AFTER_ECHO, AFTER_SILENCE, INDEPENDENT_M, USED_M, TablePings
-from echostep.localization import Building, CloudSettings, MapFilter, Start
+from echostep.localization import Building, MapFilter, Start
 from echostep.localization.grid.search import FOUND_REST, Search
-from echostep.localization.particles.cloud import cloud_about
 from echostep.particles.arrays import PingBatch
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 from echostep.walls.echo_sources import Walls
@@ -132,7 +131,3 @@ def test_a_search_in_a_room_begins_there() -> None:
     outline = np.array([[0, 0], [6, 0], [6, 8], [0, 8]], float)
     search = searching(MapFilter(ROOM, Start(room_m=outline), 0.0, np.random.default_rng(1)))
     assert search.draw(1000).x_m.max() < 6.3
-
-
-def test_a_start_that_is_a_place_is_no_search() -> None:
-    assert not cloud_about(CloudSettings(), Start(), 0.0, np.random.default_rng(1)).is_searching

@@ -138,11 +138,6 @@ def test_any_portions_tell_the_same(cuts: list[int]) -> None:
 
 
 @pytest.mark.long
-def test_chunk_by_chunk_tells_the_same() -> None:
-    assert taken(recorded(), list(range(len(recorded())))) == whole()
-
-
-@pytest.mark.long
 @given(st.integers(0, 1 << 32), st.lists(st.integers(0, 1 << 20), max_size=10))
 @settings(max_examples=25, deadline=None)
 def test_bytes_that_arrived_together_may_be_cut_anywhere(seed: int, cuts: list[int]) -> None:

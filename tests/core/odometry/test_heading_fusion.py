@@ -343,8 +343,3 @@ def test_any_damage_gives_finite_steps(seed: int, places: list[int], value: floa
         assert math.isfinite(step.heading_rad)
         assert 0.0 <= step.heading_sd_rad < 1.0
         assert math.hypot(*step.move_m) == pytest.approx(STRIDE_M)
-
-
-def test_a_stance_passes_as_it_is() -> None:
-    stance = Stance(1.0, 1.5, 0.3)
-    assert HeadingFusion().corrected(stance) is stance

@@ -15,7 +15,6 @@ from echostep.localization import Estimate, TrackStatus, digest
 from echostep.plan import Plan, Pose, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep.xsens import FrameReader, encode_frame
 from echostep_simulation.devices.board import BoardProcess, PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
 from walks import errors_of
@@ -135,23 +134,6 @@ def test_a_wrong_start_is_noticed(
     found = tracker.take(portion_of(chunks))
     sure = sure_but_wrong(found, scenario)
     assert not [e for e in sure if e.t_s > 15.0]
-
-
-def by_frame(chunks: list[Chunk]) -> list[Chunk]:
-    """The same bytes, with every MTx frame in a chunk of its own."""
-    reader, found = FrameReader(), []
-    for chunk in chunks:
-        if chunk.port == BOARD:
-            found.append(chunk)
-        else:
-            found += [replace(chunk, data=encode_frame(*frame)) for frame in reader.feed(chunk.data)]
-    return found
-
-
-def test_a_fifth_of_the_samples_may_be_missing() -> None:
-    rng = random.Random(2)
-    _, found = track([c for c in by_frame(CHUNKS) if c.port == BOARD or rng.random() > 0.2])
-    assert errors_of(found, SCENARIO).horizontal_m.max() < 1.5
 
 
 def test_noise_on_both_ports_is_survived() -> None:

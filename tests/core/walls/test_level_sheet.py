@@ -24,8 +24,6 @@ from echostep.plan import ANY_LEVEL, Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import (
-    LIFT,
-    STAIRS,
     LevelSheet,
     connector_at,
     lay_out_levels,
@@ -277,10 +275,3 @@ def test_without_the_foot_the_pressure_still_tells_the_level(wears_gyros: bool) 
     assert any(e.status is TrackStatus.LOST for e in silence) != wears_gyros
     assert later
     assert all(e.level == 1 for e in later)
-
-
-def test_kinds_have_the_kernels_numbers() -> None:
-    assert level_sheet_of(tower(2)).kind.tolist() == [STAIRS, LIFT]
-
-
-# A real lay_out_levels's plan

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.walls.echo_sources import CORNER, EDGE, MOST_SOURCES, WALL, Walls, echo_sources
+from echostep.walls.echo_sources import CORNER, MOST_SOURCES, WALL, Walls, echo_sources
 from echostep.walls.index import WallIndex, build_index, crosses_wall
 from naive import walls as naive
 
@@ -75,28 +75,7 @@ def test_sources_agree_with_the_slow_twin(
         assert sorted(s[1] for s in found) == pytest.approx(sorted(s[1] for s in expected), abs=1e-7)
 
 
-def test_a_wall_end_is_an_edge() -> None:
-    index = build_index(np.array([[1.0, 2.0, 5.0, 2.0]]))
-    (found,) = heard(0.0, 0.0, math.atan2(2.0, 1.0), index)
-    assert found == pytest.approx((math.hypot(1.0, 2.0), 0.0, EDGE), abs=1e-7)
-
-
-def test_a_wall_hides_what_is_behind_it() -> None:
-    slanted = [-1.0, 0.5, 1.0, 1.5]
-    index = build_index(np.array([[-5.0, 3.0, 5.0, 3.0], slanted]))
-    first, second = heard(0.0, 0.0, math.pi / 2, index)
-    assert first[0] == pytest.approx(2.0 / math.sqrt(5.0))  # the slanted wall's own perpendicular, 26.6 degrees off
-    assert second == pytest.approx((math.hypot(1.0, 1.5), math.atan2(1.0, 1.5), EDGE))
-    assert heard(3.0, 0.0, math.pi / 2, index)[0] == pytest.approx((3.0, 0.0, WALL), abs=1e-7)
-
-
 CORNER_OF_TWO = np.array([[0.0, 0.0, 4.0, 0.0], [0.0, 0.0, 0.0, 4.0]])
-
-
-@pytest.mark.parametrize(("x", "y", "kind"), [(1.0, 1.0, CORNER), (-1.0, -1.0, EDGE)])
-def test_a_corner_is_strong_from_inside(x: float, y: float, kind: float) -> None:
-    index = build_index(CORNER_OF_TWO)
-    assert (round(math.sqrt(2.0), 8), kind) in by_kind(heard(x, y, math.atan2(-y, -x), index))
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.004, -0.004])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Orientations of an MT -> quaternions, and the MT's world frame -> the map frame. No other module converts MT axes.
+"""Orientations of an MT -> quaternions in its world frame. No other module converts MT axes.
 
-In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world or sensor -> map. Owns nothing.
-MT world: x magnetic north, y west, z up [Manual 2.2, the default of the MTx]. Map: x east, y north, z up.
+In: Euler angles, matrices or quaternions in one of the MT's worlds. Out: quaternions w x y z, sensor -> MT world. Owns nothing.
+MT world: x magnetic north, y west, z up [Manual 2.2, the default of the MTx].
 """
 
 from __future__ import annotations
@@ -18,11 +18,9 @@ EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees of roll, pitch, yaw:
 ROTATION_ERROR = 0.02  # largest error of an element of R R^T and of the right-handed frame; assumed
 IDENTITY = np.eye(3).ravel()
 _HALF = math.sqrt(0.5)
-TO_MAP = np.array([_HALF, 0.0, 0.0, _HALF])  # north, west, up -> east, north, up: a quarter turn about up
-FROM_WORLD = {  # ENU, NED or NWU -> north, west, up
+FROM_WORLD = {  # ENU or NED -> north, west, up
     ENU: np.array([_HALF, 0.0, 0.0, -_HALF]),
     NED: np.array([0.0, 1.0, 0.0, 0.0]),
-    NWU: np.array([1.0, 0.0, 0.0, 0.0]),
 }
 
 

@@ -24,22 +24,8 @@ from echostep_app.page.elements.scene import ParticleSample
 from echostep_app.page.guarded_socket import MOST_UNDRAWN
 from echostep_app.page.mailbox import MOST_CHECK_INS, Mailbox, popped
 from echostep_app.page.server import MOST_PAGES, Address, PageServer
-from page.frames import PLAN, fetched, header, lines_of, next_frame, opened, scene, served
+from page.frames import PLAN, fetched, header, next_frame, opened, scene, served
 from waiting import PATIENCE_S, ends
-
-
-def test_a_page_gets_plan_lines_and_frames() -> None:
-    with served() as (server, mailbox):
-        mailbox.trail.add(1.0, 2.0, 0)
-        mailbox.publish(scene(trail_count=1))
-        with opened(server) as page:
-            hello = json.loads(page.recv(timeout=PATIENCE_S))
-            frame = next_frame(page)
-        walls = lines_of(server.url, 0)["wall"]
-    assert hello["plan"]["levels"][0]["rooms"][0]["name"] == "Office 1"
-    assert np.array_equal(walls, PLAN.levels[0].solid.astype("<f4"))
-    assert frame["trail"] == {"first": 0, "count": 1}
-    assert frame["cloud"]["count"] == 300
 
 
 def test_the_cloud_is_quantised_to_a_millimetre() -> None:

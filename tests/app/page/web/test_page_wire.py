@@ -30,6 +30,7 @@ def test_a_page_of_any_plan_gets_hello_lines_and_frames(plan: Plan) -> None:
         for k, level in enumerate(plan.levels):
             lines = lines_of(server.url, k)
             assert len(lines["wall"]) == len(level.solid) - len(level.windows)
+            assert np.array_equal(lines["wall"][: len(level.walls)], level.walls.astype("<f4"))
             assert len(lines["unknown"]) == len(level.doors)  # both plans say of no door whether it is open
         assert not server.shared.faults.notices
     rooms = [[room["name"] for room in level["rooms"]] for level in hello["plan"]["levels"]]

@@ -101,9 +101,3 @@ def test_every_report_makes_a_valid_event(
 @pytest.mark.parametrize(("source", "meaning"), [("live", "fused"), ("replay", "relayed"), ("simulated", "simulated")])
 def test_how_says_what_the_schema_says(source: str, meaning: str) -> None:
     assert HOW_MACHINE[HOW[source]] == meaning
-
-
-WRONG = {
-    "version": "1.0", "type": "a f", "how": "machine", "time": "noon", "stale": "2026-13-01T00:00:00Z", "qos": "high",
-    "colour": "red",
-}  # fmt: skip

@@ -13,15 +13,11 @@ from hypothesis import strategies as st
 from echostep.echoes.likelihood import EchoSettings, echo_density, echo_model
 from echostep.localization import CloudSettings, Start, TrackStatus
 from echostep.localization.cloud_estimate import estimate_of
-from echostep.localization.particles.cloud import BENDS, Cloud, cloud_about
+from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.ellipse import ellipse95
 from echostep.particles.kernels import (
-    NOISE_BEND,
-    begin_segment,
     effective_size,
-    piece_of,
-    propagate,
     systematic,
 )
 from echostep.plan import Pose
@@ -130,20 +126,6 @@ def test_a_turn_leads_round_the_end_of_a_wall(bend_m: float, passes: bool) -> No
     assert (found.propagate_and_reweight(move, pings, MODEL, jamb).log_path > -0.1) == passes
 
 
-def test_ways_of_particles_differ_in_the_middle_of_a_turn_and_end_alike() -> None:
-    found = cloud()
-    move = Move(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.4)
-    noise = np.zeros((5, len(found.x_m)))
-    noise[NOISE_BEND] = np.linspace(*BENDS, len(found.x_m))
-    found.turn_rad[:], found.scale[:] = 0.0, 1.0
-    begin, arrays = found.y_m.copy(), begin_segment(found.arrays)
-    propagate(found.arrays, arrays, piece_of(move, 0.0, 0.5), 0.5, noise, math.exp(-6.0), BOX.index)
-    middle = found.y_m - begin
-    assert [middle.max(), middle.min()] == pytest.approx([0.0, -0.4])
-    propagate(found.arrays, arrays, piece_of(move, 0.5, 1.0), 0.5, noise, math.exp(-6.0), BOX.index)
-    assert found.y_m == pytest.approx(begin)
-
-
 def test_a_move_through_a_wall_is_survived_wider() -> None:
     found = cloud()
     found.x_m[:], found.y_m[:], found.turn_rad[:] = 1.0, 1.0, 0.0
@@ -158,31 +140,6 @@ def test_echoes_find_the_place_across_a_corridor() -> None:
             explained = found.propagate_and_reweight(Move(0.0, 0.0, 0.0, 0.0), heard(axis, range_m), MODEL, BOX)
     assert estimate_of([(found, 1.0)], 0.0, 0.0, 0).y_m == pytest.approx(1.3, abs=0.05)
     assert explained[0] > 0.3 * 1.0  # the power of the pings
-
-
-def test_pings_count_where_they_were_triggered() -> None:
-    """A wall end passed halfway: the same ranges in another order put the cloud elsewhere."""
-    gate = Walls(np.array([[0.0, 1.0, 3.0, 1.0], [3.0, 1.0, 3.0, 4.0]]))
-    place = Pose(2.0, 0.0, 0.0)
-    shares = np.linspace(0.05, 0.95, 10)
-    ends = {}
-    for name, ranges in (("passed", [1.0] * 5 + [0.0] * 5), ("not yet", [1.0] * 10)):
-        found = cloud_about(CloudSettings(size=2000), Start(place, 0.3), 0.0, np.random.default_rng(3))
-        pings = PingBatch(
-            shares,
-            np.full(10, math.pi / 2),
-            np.array(ranges),
-            np.ones(10),
-            np.zeros(10, np.int64),
-            np.full(10, 0.15),
-            np.full(10, MODEL.stray),
-            np.zeros(10),
-            np.full(10, ALIKE),
-            np.full(10, UNPLANNED),
-        )
-        found.propagate_and_reweight(Move(1.6, 0.0, 0.05, 0.0), pings, MODEL, gate)
-        ends[name] = estimate_of([(found, 1.0)], 0.0, 0.0, 0).x_m
-    assert ends["passed"] > ends["not yet"] + 0.2
 
 
 def test_an_unwatched_move_grows_the_cloud_and_it_shrinks_again() -> None:
