@@ -165,12 +165,12 @@ def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_pat
 def test_arrays_in_other_units_or_order_are_refused(
     walk: Imu, spoilt: Callable[..., tuple[Floats, Floats, Floats]], words: str
 ) -> None:
-    """By the words and rules for files; portions of a few samples, too."""
+    """By the words and rules for files; large portions, too."""
     samples = spoilt(walk.t_s, walk.accel, walk.gyro)
     with pytest.raises(EchostepError, match=words):
         walk_track(*samples)
     tracker = echostep.Tracker(NO_PLAN, None, echostep.Settings.of_imu(100.0))
-    portions = (tuple(each[k : k + 7] for each in samples) for k in range(0, len(walk.t_s), 7))
+    portions = (tuple(each[k : k + 700] for each in samples) for k in range(0, len(walk.t_s), 700))
     with pytest.raises(EchostepError, match=words):
         list(starmap(tracker.feed_samples, portions))
 

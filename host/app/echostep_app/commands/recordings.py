@@ -52,7 +52,7 @@ def export(
     file: Recording,
     out: Annotated[
         Path,
-        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, .geojson, .tum, or .mcap with derived messages."),
+        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, .tum, or .mcap with derived messages."),
     ],
     plan: OptionalPlan = None,
     start: Annotated[

@@ -7,8 +7,6 @@ latitude. Owns nothing. GPX has no heights: `ele` is metres above the sea, to wh
 
 from __future__ import annotations
 
-import json
-import math
 import sqlite3
 import struct
 import xml.etree.ElementTree as ET
@@ -198,25 +196,6 @@ def write_gpx(out: Path, track: TrackOnPlan) -> None:
             if track.moments:
                 _element(point, "time", track.moments[k])
     _save(root, out)
-
-
-def write_geojson(out: Path, track: TrackOnPlan) -> None:
-    """The estimates that claim a place as points with all their columns, and the track as lines [RFC 7946]."""
-    columns = flat(columns_of(track.estimates, track.plan))
-    points = list(zip(columns.pop("longitude_deg"), columns.pop("latitude_deg"), strict=True))
-    lines = [track.degrees[ks].tolist() for ks in track.stretches if len(ks) > 1]
-    features = [_feature("LineString", line, {}) for line in lines]
-    for at, row in zip(points, zip(*columns.values(), strict=True), strict=True):
-        if at[0] is not None:
-            known = {
-                name: v for name, v in zip(columns, row, strict=True) if not isinstance(v, float) or math.isfinite(v)
-            }
-            features.append(_feature("Point", at, known))
-    out.write_text(json.dumps({"type": "FeatureCollection", "features": features}), encoding="utf-8")
-
-
-def _feature(kind: str, coordinates: Any, properties: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "Feature", "geometry": {"type": kind, "coordinates": coordinates}, "properties": properties}
 
 
 def _root(space: str, name: str, **attributes: str) -> ET.Element:

@@ -25,7 +25,7 @@ from echostep.tracker import Tracker
 from echostep.walk.table import columns_of, refuse_none
 from echostep_app.extras import require
 from echostep_app.output.derived import Derived
-from echostep_app.output.map_files import TrackOnPlan, flat, write_geojson, write_geopackage, write_gpx, write_kml
+from echostep_app.output.map_files import TrackOnPlan, flat, write_geopackage, write_gpx, write_kml
 from echostep_app.plan.georeference import earth_of
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console_for_people
@@ -130,8 +130,7 @@ FORMATS: dict[str, Write] = {
     ".gpkg": write_geopackage,
     ".kml": write_kml,
     ".gpx": write_gpx,
-    ".geojson": write_geojson,
     ".tum": _write_tum,
     ".mcap": lambda *_: None,
 }
-NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx", ".geojson")
+NEEDS_GEOREFERENCE = (".gpkg", ".kml", ".gpx")

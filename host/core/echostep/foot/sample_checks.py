@@ -35,7 +35,7 @@ DEAD_S = 2.0  # longest time without a change while the foot moves
 MOVING_RAD_S = 0.5  # rate of a moving foot
 MOVING_SHARE = 0.1  # of a stretch without a change in which the foot moves
 OF_NO_UNIT = 1e6  # force or rate that no unit of a sample gives
-FIRST = 3000  # samples that are checked of arrays: 6 s to a minute
+FEWEST_SAMPLES, FIRST = 500, 3000  # of arrays that are checked: 1 to 10 s, 6 to 60 s
 
 
 def complaint(table: Floats, columns: Sequence[str]) -> str:
@@ -43,24 +43,17 @@ def complaint(table: Floats, columns: Sequence[str]) -> str:
     return time_complaint(table[:, TIME], "a foot") or _dead_complaint(table, columns) or _unit_complaint(table)
 
 
-class FirstSamples:
-    """A foot IMU's first samples, refused where those of a file would be, by their times and units."""
+def check_samples(t_s: Floats, accel: Floats, gyro: Floats) -> None:
+    """Refuse what a file's rows would be refused for: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; fewer than FEWEST_SAMPLES may be of a foot that does not rest.
 
-    def __init__(self) -> None:
-        self._table, self._checked = np.empty((0, SENSOR_COLUMNS)), 0
-
-    def add(self, t_s: Floats, accel: Floats, gyro: Floats) -> None:
-        """Samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s. Raises EchostepError with the factor to multiply or divide by."""
-        if len(self._table) >= FIRST or np.shape(accel) != np.shape(gyro) or np.shape(accel) != (len(t_s), 3):
-            return
-        rows = np.column_stack([t_s, accel, gyro])[: FIRST - len(self._table)]
-        possible = np.isfinite(rows[:, TIME]) & (np.abs(rows[:, FORCE.start :]) < OF_NO_UNIT).all(axis=1)
-        self._table = np.vstack([self._table, rows[possible]])
-        if len(self._table) < self._checked + FEWEST_ROWS:
-            return
-        self._checked = len(self._table)
-        if wrong := time_complaint(self._table[:, TIME], "a foot") or _unit_complaint(self._table):
-            raise EchostepError(f"samples: {wrong}")
+    Raises EchostepError with the factor to multiply or divide by.
+    """
+    if len(t_s) < FEWEST_SAMPLES or np.shape(accel) != (len(t_s), 3) or np.shape(gyro) != (len(t_s), 3):
+        return
+    rows = np.column_stack([t_s, accel, gyro])[:FIRST]
+    rows = rows[np.isfinite(rows[:, TIME]) & (np.abs(rows[:, FORCE.start :]) < OF_NO_UNIT).all(axis=1)]
+    if len(rows) and (wrong := time_complaint(rows[:, TIME], "a foot") or _unit_complaint(rows)):
+        raise EchostepError(f"samples: {wrong}")
 
 
 def time_complaint(t_s: Floats, what: str) -> str:

@@ -31,7 +31,7 @@ from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
-from echostep.foot.sample_checks import FirstSamples
+from echostep.foot.sample_checks import check_samples
 from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch
 from echostep.path import Dropout, MeasuredSegment, PathSegment
@@ -81,7 +81,7 @@ class Tracker:
         self._building = Building.of(plan, self.laid_out)
         self.filter: AidedFilter | None = None  # from the first segment on
         self.gateway = Gateway()
-        self._imu, self._first_samples = SampleCounter(s.mtx.rate_hz), FirstSamples()  # for `feed_samples`
+        self._imu = SampleCounter(s.mtx.rate_hz)  # for `feed_samples`
         self.watchers: list[Watch] = []  # called in this order
         self._readings: list[BeaconReading] = []  # waiting for their segment
         self._meetings = MeetingQueue()
@@ -183,7 +183,7 @@ class Tracker:
         No estimate comes before the foot has stood. Raises EchostepError where the first samples are in other units or not in order, with the
         factor, and for other shapes.
         """
-        self._first_samples.add(t_s, accel, gyro)
+        check_samples(t_s, accel, gyro)
         estimates = self._published(self.front_end.process_samples(self._imu.of(t_s, accel, gyro)))
         self.watch.advance()
         return estimates

@@ -10,38 +10,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Protocol
 
 from echostep.aiding import MOST_TEAMMATES
 from echostep.plan import Plan
 from echostep.ports.people.meeting import MeetingMessage, Status
-from echostep.ports.people.payloads import MOST_LEVELS, Spread
+from echostep.ports.people.payloads import MOST_LEVELS
 from echostep.ports.people.team_beacons import BEACONS, SHARE_S, SharedBeacon, TeamBeacons, parse_team_beacons
 from echostep_app.session.team.subscription import TeamSubscription
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.inbox import ReceivedMessage
+from echostep_app.team.messages.report import Position
 from echostep_app.team.roster import Member, MemberState, Roster
 
 KNOWN: dict[str, Status] = {"tracking": "tracking", "uncertain": "uncertain"}  # any other state carries no position
 
 
-class ReportedPosition(Spread, Protocol):
-    """A position as teammates report it."""
-
-    @property
-    def x_m(self) -> float: ...
-    @property
-    def y_m(self) -> float: ...
-    @property
-    def floor(self) -> int: ...
-    @property
-    def floor_probability(self) -> float: ...
-    @property
-    def age_s(self) -> float: ...
-
-
 def meeting_with(
-    name: str, status: str, p: ReportedPosition, measured: tuple[float, float] | None = None
+    name: str, status: str, p: Position, measured: tuple[float, float] | None = None
 ) -> MeetingMessage | None:
     """A meeting with a teammate, from its report; None on a floor that no plan has. `measured`: a radio range and its standard deviation (m)."""
     if not 0 <= p.floor < MOST_LEVELS:

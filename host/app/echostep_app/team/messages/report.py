@@ -21,7 +21,7 @@ from msgspec import Meta
 
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M, field_of
-from echostep.ports.people.payloads import has_covariance
+from echostep.ports.people.payloads import is_covariance
 
 MAX_PAYLOAD = 8192  # bytes; a report has about 900
 WITHOUT_PLAN = 64 * "0"  # the SHA-256 of no file: the wearer is tracked without a plan, in a frame of its own
@@ -225,7 +225,7 @@ def decode(payload: bytes) -> Report:
         raise BadReportError("status and last place contradict each other")
     texts = [report.plan, report.version, *findings]
     for q in (p, report.last_place):
-        if q is not None and not has_covariance(q):
+        if q is not None and not is_covariance(q.xx_m2, q.xy_m2, q.yy_m2):
             raise BadReportError("position: not a covariance")
         texts += [q.floor_name, q.where] if q else []
     for text in texts:

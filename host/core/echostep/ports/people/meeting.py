@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from echostep.fields import Metres
-from echostep.ports.people.payloads import Level, Variance, decoded, has_covariance
+from echostep.ports.people.payloads import Level, Variance, decoded, is_covariance
 
 Status = Literal["tracking", "uncertain", "lost"]
 MEETING = "meeting"  # name of the port
@@ -53,4 +53,4 @@ _DECODER = msgspec.json.Decoder(MeetingMessage)
 def parse_meeting(payload: bytes) -> MeetingMessage | None:
     """The meeting in a chunk; None if the bytes are no meeting, or hold no covariance."""
     meeting = decoded(payload, _DECODER, MOST_BYTES)
-    return meeting if meeting is not None and has_covariance(meeting) else None
+    return meeting if meeting and is_covariance(meeting.xx_m2, meeting.xy_m2, meeting.yy_m2) else None

@@ -6,7 +6,7 @@ In: bytes that may be damaged or hostile. Out: a structure, or None. Owns the li
 
 from __future__ import annotations
 
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -16,17 +16,6 @@ MOST_LEVELS = 1000  # of a plan, assumed
 Level = Annotated[int, Meta(ge=0, lt=MOST_LEVELS)]
 Variance = Annotated[float, Meta(ge=0.0, le=1e12)]
 T = TypeVar("T")
-
-
-class Spread(Protocol):
-    """Variances and covariance (m2) of a place."""
-
-    @property
-    def xx_m2(self) -> float: ...
-    @property
-    def xy_m2(self) -> float: ...
-    @property
-    def yy_m2(self) -> float: ...
 
 
 def decoded(payload: bytes | str, decoder: msgspec.json.Decoder[T], most_bytes: int) -> T | None:
@@ -39,6 +28,6 @@ def decoded(payload: bytes | str, decoder: msgspec.json.Decoder[T], most_bytes: 
         return None
 
 
-def has_covariance(place: Spread) -> bool:
+def is_covariance(xx_m2: float, xy_m2: float, yy_m2: float) -> bool:
     """Whether the three numbers are a covariance, to rounding: its determinant is not negative."""
-    return place.xy_m2**2 <= place.xx_m2 * place.yy_m2 * (1.0 + 1e-9) + 1e-12
+    return xy_m2**2 <= xx_m2 * yy_m2 * (1.0 + 1e-9) + 1e-12

@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from echostep.fields import Metres
-from echostep.ports.people.payloads import Level, Variance, decoded, has_covariance
+from echostep.ports.people.payloads import Level, Variance, decoded, is_covariance
 
 TEAM_BEACONS = "team_beacons"  # name of the port
 BEACONS = "beacons"  # last part of the topic
@@ -64,4 +64,4 @@ def parse_team_beacons(payload: bytes) -> TeamBeacons | None:
     if message is None:
         return None
     is_unique = len({b.number for b in message.beacons}) == len(message.beacons)
-    return message if is_unique and all(has_covariance(b) for b in message.beacons) else None
+    return message if is_unique and all(is_covariance(b.xx_m2, b.xy_m2, b.yy_m2) for b in message.beacons) else None
