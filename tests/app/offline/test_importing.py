@@ -17,7 +17,6 @@ import echostep
 from command_line import echostep as run
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.foot.steps import walk_track
 from echostep.localization import Estimate, digest
 from echostep.offline.imu_csv import Imu
 from echostep.plan import NO_PLAN, Pose, load_plan
@@ -167,8 +166,6 @@ def test_arrays_in_other_units_or_order_are_refused(
 ) -> None:
     """By the words and rules for files; large portions, too."""
     samples = spoilt(walk.t_s, walk.accel, walk.gyro)
-    with pytest.raises(EchostepError, match=words):
-        walk_track(*samples)
     tracker = echostep.Tracker(NO_PLAN, None, echostep.Settings.of_imu(100.0))
     portions = (tuple(each[k : k + 700] for each in samples) for k in range(0, len(walk.t_s), 700))
     with pytest.raises(EchostepError, match=words):

@@ -69,7 +69,8 @@ def examine(
     if ports[BOARD] is None:
         report.findings.append(_no_board(seen))
     if ports[MTX] is None and foot is None:
-        report.findings.append(_no_mtx())
+        what = "neither an MTx nor a foot board is plugged in: only the legs can be tracked"
+        report.findings.append(Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot"))
     report.findings += _several_boards(seen, board, foot)
     at_ankle = usable.pop(FOOT, None)
     if usable:
@@ -107,11 +108,6 @@ def _several_boards(seen: list[PortSeen], *chosen: str | None) -> list[Finding]:
         return []
     what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {' and '.join(examined)}"
     return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
-
-
-def _no_mtx() -> Finding:
-    what = "neither an MTx nor a foot board is plugged in: only the legs can be tracked"
-    return Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot")
 
 
 def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, schedule: Schedule | None) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
-from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootHealth, FootState, Part
+from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootState, Part
 from echostep_app.board.faults.device_faults import foot_celsius
 from echostep_app.board.faults.findings import PART_NAMES, Finding, Severity
 from echostep_app.board.faults.health import board_findings
@@ -45,18 +45,15 @@ def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     if reports.foot is None:
         report.findings.append(_no_part(probed))
         return
-    report.lines.append(f"{'foot':10}{_part_text(reports.foot)}{_rest_text(probed)}")
+    c, state = reports.foot.temperature, FootState(reports.foot.foot_state).name.lower()
+    warm = "" if c == FOOT_HEALTH_TEMPERATURE_INVALID else f", {foot_celsius(c):.0f} degC"
+    report.lines.append(f"{'foot':10}{PART_NAMES[Part.ICM20649]}, identity 0xE1, {state}{warm}{_rest_text(probed)}")
     rate_hz = probed.rates_hz.get("Foot", 0.0)
     report.lines.append(
         f"{'rates':10}foot {rate_hz:.1f}/s; {probed.lost} frames lost, {reports.foot.missed} samples missed"
     )
     report.findings += board_findings(reports) + _sample_findings(probed, rate_hz)
     clock_diagnosis(report, probed, subject)
-
-
-def _part_text(foot: FootHealth) -> str:
-    warm = "" if foot.temperature == FOOT_HEALTH_TEMPERATURE_INVALID else f", {foot_celsius(foot.temperature):.0f} degC"
-    return f"{PART_NAMES[Part.ICM20649]}, identity 0xE1, {FootState(foot.foot_state).name.lower()}{warm}"
 
 
 def _rest(probed: ProbeResult) -> tuple[float, float] | None:

@@ -141,12 +141,8 @@ def _point(place: ReportedPlace | None) -> dict[str, str]:
         return {"lat": "0.0", "lon": "0.0", "hae": UNKNOWN, "ce": UNKNOWN, "le": UNKNOWN}
     hae, le = (UNKNOWN if v is None else f"{v:.2f}" for v in (place.hae_m, place.hae_sd_m))
     lat, lon = f"{place.lat_deg:.8f}", f"{place.lon_deg:.8f}"
-    return {"lat": lat, "lon": lon, "hae": hae, "ce": _rounded_up(place.sd_m), "le": le}
-
-
-def _rounded_up(metres: float) -> str:
-    """Metres with two decimals, rounded up, so that no error is written smaller than it is."""
-    return f"{math.ceil(metres * 100.0) / 100.0:.2f}"
+    # Rounded up, so that no error is written smaller than it is
+    return {"lat": lat, "lon": lon, "hae": hae, "ce": f"{math.ceil(place.sd_m * 100.0) / 100.0:.2f}", "le": le}
 
 
 class UdpTransport:

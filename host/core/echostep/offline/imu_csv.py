@@ -19,13 +19,12 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.file_mode import claim
 from echostep.foot.alignment import aligned
-from echostep.foot.sample_checks import complaint
 from echostep.foot.steps import Stance, Step, Track, walk_track
 from echostep.foot.trunk_path import RUN_STANCE_S
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
 from echostep.offline.header import HeaderReader, own_header
-from echostep.offline.imu_checks import contradiction, end_sd_m, notes, sorted_by_time, whole_rows
+from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
 COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz")
 MAG_COLUMNS = ("mx", "my", "mz")

@@ -20,7 +20,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from echostep_app.page.web.connections import Connections, Peer
+from echostep_app.page.web.connections import Connections
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SECURITY_HEADERS = {
@@ -57,7 +57,8 @@ class AccessControl:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        peer = _peer(scope)
+        host, port = scope.get("client") or ("", 0)
+        peer = str(host), int(port)
         self._connections.begin(peer, stays=scope["type"] == "websocket" and self._is_allowed(scope))
         try:
             await self._answer(scope, receive, send)
@@ -109,12 +110,6 @@ class AccessControl:
         if self._tell and page not in self._told and len(self._told) < MOST_TOLD:
             self._told.add(page)
             self._tell(f"{page} is refused by the page's server: {remedy}")
-
-
-def _peer(scope: Scope) -> Peer:
-    """Address and port of the other end."""
-    host, port = scope.get("client") or ("", 0)
-    return str(host), int(port)
 
 
 def _netloc(origin: str) -> str | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -69,22 +69,18 @@ class DemoOptions:
 
 def demo(options: DemoOptions, output: OutputOptions) -> None:
     """Simulate a walk, track and record it."""
-    with _plan_file(options) as plan_path:
+    # The plan of the demo may be inside an archive
+    with as_file(_DEMO_PLAN) if options.plan_path is None else nullcontext(options.plan_path) as plan_path:
         plan = open_limited(plan_path)
     waypoints = DEMO_WAYPOINTS if options.plan_path is None else room_tour(plan)
     if options.kit is Kit.OF_2026 and options.board_command is None:
         raise EchostepError("the kit of 2026 needs the real firmware in the simulator: make demo KIT=2026")
     with ExitStack() as stack:
         board = stack.enter_context(closing(_board(options)))
-        foot_board = stack.enter_context(closing(_foot_board(options))) if options.kit is Kit.OF_2026 else None
+        foot_command = [*shlex.split(options.board_command or ""), "--seed", str(FOOT_BOARD)]
+        foot_board = stack.enter_context(closing(BoardProcess(foot_command))) if options.kit is Kit.OF_2026 else None
         output = replace(output, folder=output_folder(output.folder))
         _track((board, foot_board), plan, waypoints, options, output)
-
-
-def _plan_file(options: DemoOptions) -> AbstractContextManager[Path]:
-    """The plan's file; that of the demo may be inside an archive."""
-    path = options.plan_path
-    return as_file(_DEMO_PLAN) if path is None else nullcontext(path)
 
 
 def _board(options: DemoOptions) -> Board:
@@ -98,10 +94,6 @@ def _board(options: DemoOptions) -> Board:
     )
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}, with the parts {parts}.")
     return board
-
-
-def _foot_board(options: DemoOptions) -> Board:
-    return BoardProcess([*shlex.split(options.board_command or ""), "--seed", str(FOOT_BOARD)])
 
 
 def _track(

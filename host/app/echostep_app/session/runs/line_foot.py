@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.foot.sample_checks import complaint
+from echostep.offline.imu_checks import complaint
 from echostep.offline.imu_csv import COLUMNS
 from echostep.ports.chunks import LINES, Chunk
 from echostep.settings import imu_settings, parse_settings
