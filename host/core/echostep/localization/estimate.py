@@ -47,7 +47,7 @@ class Estimate:
     >>> import echostep
     >>> last = echostep.replay("walk.mcap", "demo.json").estimates[-1]
     >>> last
-    <Estimate at 2.67 s: x 2.00 m, y 7.50 m, level 0, 95 % within 0.39 m, heading 0 deg from x, tracking>
+    <Estimate at 2.67 s: x 2.00 m, y 7.50 m, level 0, 95 % within 0.40 m, heading 0 deg from x, tracking>
     >>> last.status == "tracking"
     True
     >>> round(last.ellipse95.minor_m, 1)

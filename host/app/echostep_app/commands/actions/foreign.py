@@ -43,9 +43,9 @@ MOST_NAMES = 12  # columns that are named
 
 
 def refuse_foreign(paths: Sequence[Path]) -> None:
-    """Raises EchostepError for a file that is named otherwise than recordings are, and is none."""
+    """Raises EchostepError for a table, which `import` reads."""
     for path in paths:
-        if path.is_file() and path.suffix.casefold() != SUFFIX and (what := foreign(path)):
+        if path.is_file() and path.suffix.casefold() != SUFFIX and (what := foreign(path)).startswith("a table"):
             raise EchostepError(
                 f"{path}: no recording but {what}; echostep import {path} -o walk.mcap makes one of a foot's samples"
             )
