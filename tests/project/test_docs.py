@@ -157,7 +157,7 @@ def test_the_commands_for_a_team_run(tmp_path: Path) -> None:
             assert program == "echostep"
             done = echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "120"}, ends=0)
             printed += done.stdout
-    assert re.search(r"red/anna +ended", printed)
+    assert re.search(r"red/anna: run ended", printed)
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "host/README.md", *MANUAL], ids=name_of)

@@ -34,10 +34,9 @@ def cells(path: Path) -> list[dict[str, Any]]:
 def prescribed() -> set[str]:
     """The optional packages that the page's one line installs."""
     (line,) = re.findall(r"`pip install (.*?)`", (FOLDER / "README.md").read_text())
-    *names, project = map(Requirement, shlex.split(line))
-    return {
-        package for package, extra in EXTRAS.items() if extra in project.extras or package in {r.name for r in names}
-    }
+    *names, app = shlex.split(line)
+    extras = Requirement(f"app[{app.partition('[')[2]}").extras
+    return {package for package, extra in EXTRAS.items() if extra in extras or package in names}
 
 
 def run(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> tuple[dict[str, Any], list[Any]]:

@@ -13,8 +13,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
@@ -27,9 +25,12 @@ PAUSE_S, LONG_S = (
     5.0,
 )  # between two segments: nothing was received; of an unobserved segment: a walk out of the room
 UNOBSERVED_DOUBT = 0.2  # probability that such a way led out of the scattered cloud
-STEP_M, STEP_RAD = 0.5, 0.5  # of a step that is no shuffle; a shorter one speaks by its share
+STEP_M, STEP_RAD = (
+    0.5,
+    0.9,
+)  # of a step that is no shuffle; a shorter one speaks by its share squared: a false one has 0.1 m
 SILENCE_S = 1.0  # in which rangers that are not silent hear something
-SHUFFLE = np.array([0.2, 0.2, 0.35])  # m, m, rad: after such a way or turn the rangers hear something else
+SHUFFLE = 0.4  # of a step: after a longer one the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
 ALIKE_M = 0.15  # error of an echo, sway and a slight turn of the body
 # Log-likelihood ratios, moved / stood: of a foot that stays off the floor, of a step
@@ -82,14 +83,12 @@ class UnmeasuredWay:
     def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
-        if is_step:
-            self._shift += segment.dx_m, segment.dy_m, segment.turn_rad
-        if (np.abs(self._shift) > SHUFFLE).any():
+        way = math.hypot(segment.dx_m / STEP_M, segment.dy_m / STEP_M, segment.turn_rad / STEP_RAD)
+        if is_step and way > SHUFFLE:
             self._look_anew(segment.t1_s)
         ratio = ALOFT if segment.aloft and not was_aloft else 0.0
         if is_step and not segment.aloft:
-            way = math.hypot(segment.dx_m / STEP_M, segment.dy_m / STEP_M, segment.turn_rad / STEP_RAD)
-            ratio = STEPPED * (1.0 if segment.unobserved else min(way, 1.0))
+            ratio = STEPPED * (1.0 if segment.unobserved else min(way, 1.0) ** 2)
         return ratio + sum(
             map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
         )
@@ -98,7 +97,6 @@ class UnmeasuredWay:
         """From here on the rangers hear something else."""
         self._heard: tuple[list[float], list[float]] = ([], [])
         self._last, self._settled_s = [math.nan, math.nan], t_s + SETTLING_S
-        self._shift = np.zeros(3)
 
     def _compared(self, which: int, range_m: float, t_s: float) -> float:
         """Log-likelihood ratio of a ping of the stand; NaN: no echo."""
