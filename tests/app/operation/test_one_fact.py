@@ -32,7 +32,7 @@ RADIUS = re.compile(r"±([\d.]+) m")
 
 
 class Wearer:
-    """Who walks, and sends an estimate each half second; `stopped`: the sensors are silent, heartbeats go on."""
+    """A run that sends an estimate each half second; `stopped`: the sensors are silent, heartbeats go on."""
 
     def __init__(self, name: str) -> None:
         self.name, self.stopped, self.ended, self.alarm = name, False, False, False

@@ -185,7 +185,7 @@ def test_yesterdays_order_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_an_order_is_over_when_all_are_out() -> None:
-    """Of those who had ended before nobody is out by it; a call for help is not out."""
+    """A run that had ended before is not out by it; nor is a run that calls for help."""
     team, told = Team(now_s=0.0), list[tuple[str, bytes]]()
 
     def end(name: str) -> None:

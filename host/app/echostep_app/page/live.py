@@ -224,7 +224,7 @@ class LivePage:
         if not later or later[-1].t1_s <= self._lookahead_s:
             return
         self._lookahead_s = later[-1].t1_s
-        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place, or turned nobody knows how, stays
+        moved = replace(estimate, t_s=self._lookahead_s)  # a mean that is no place, or whose heading is unknown, stays
         if is_placed(estimate, self._tracker.plan) and estimate.heading_sd_rad <= KNOWN_HEADING_RAD:
             moved = extrapolate(estimate, state.last_segment, later)
         if moved.status is not estimate.status:  # it is worse

@@ -28,6 +28,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # byte order marks [Unicode 2.13]: Excel's 
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
+TIME_UNITS = (("milliseconds", "ms", 1e3), ("microseconds", "us", 1e6), ("nanoseconds", "ns", 1e9))  # per second
 
 Result = TypeVar("Result")
 
@@ -129,6 +130,17 @@ def _check_share(rows: int, bad: int) -> None:
     if bad > MOST_BAD * rows:
         share = f"{100 * bad / rows:.0f} % of the first {rows} rows"
         raise ValueError(f"{share} have no number in some column, or more cells than there are names")
+
+
+def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
+    """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
+    if range_hz[0] <= rate <= range_hz[1]:
+        return ""
+    for unit, option, factor in TIME_UNITS:
+        if range_hz[0] <= rate * factor <= range_hz[1]:
+            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
+    advice = too_slow if rate < range_hz[0] else too_fast
+    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
 
 
 def number_of(text: str) -> float:

@@ -17,13 +17,13 @@ from echostep.arrays import Floats, spans
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
+from echostep.offline.csv_table import rate_complaint
 from echostep.xsens.reader import HELD
 
 TIME = 0  # columns of the table
 FORCE = slice(1, 4)
 RATE = slice(4, 7)
 SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
-TIME_UNITS = (("milliseconds", "ms", 1e3), ("microseconds", "us", 1e6), ("nanoseconds", "ns", 1e9))  # per second
 
 # Assumed, all of them.
 CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
@@ -33,20 +33,20 @@ G_RANGE = (0.7, 1.3)  # the same in units of gravity
 FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
 FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
 RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
+REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
+LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
 REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
+MISSING_SHARE = 0.02  # share of missing samples that is reported
+CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
+FEWEST_REPEATS = 3  # of equal neighbours at the limit
 FEWEST_ROWS = 100  # fewer rows do not show a dead sensor
+DEAD_SHARE = 0.5  # share of rows that repeat, from which on a sensor is dead
 DEAD_S = 2.0  # longest time without a change while the foot moves
 MOVING_RAD_S = 0.5  # rate of a moving foot
 MOVING_SHARE = 0.1  # of a stretch without a change in which the foot moves
 OF_NO_UNIT = 1e6  # force or rate that no unit of a sample gives
 FEWEST_SAMPLES, FIRST = 500, 3000  # of arrays that are checked: 1 to 10 s, 6 to 60 s
-REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
-LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
-MISSING_SHARE = 0.02  # share of missing samples that is reported
-CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
-FEWEST_REPEATS = 3  # of equal neighbours at the limit
-DEAD_SHARE = 0.5  # share of rows that repeat, from which on a sensor is dead
 SHORTEST_STEP_S = 0.05  # lower bound of a step's duration where its speed is computed
 FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
 FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
@@ -150,17 +150,6 @@ def _resting_force(table: Floats) -> float:
     rate = np.linalg.norm(table[:, RATE], axis=1)
     calm = rate <= np.quantile(rate, CALMEST_SHARE)
     return float(np.median(np.linalg.norm(table[calm, FORCE], axis=1)))
-
-
-def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
-    """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
-    if range_hz[0] <= rate <= range_hz[1]:
-        return ""
-    for unit, option, factor in TIME_UNITS:
-        if range_hz[0] <= rate * factor <= range_hz[1]:
-            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
-    advice = too_slow if rate < range_hz[0] else too_fast
-    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
 
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:

@@ -78,7 +78,7 @@ def test_the_order_to_leave_shows_and_speaks_the_way_out(visit: tuple[Mailbox, A
     order = ShownOrder("everybody 1", "Ann: Everybody out!", urgent=True)
     mailbox.set_orders((replace(order, id="note 1", urgent=False),))
     wait_for(page, "said.includes('Ann: Everybody out!')")
-    assert page.evaluate("echostep.last.goal") is None  # a note sends nobody out
+    assert page.evaluate("echostep.last.goal") is None  # a note sets no goal
     mailbox.set_orders((order,))
     wait_for(page, "said.at(-1) === 'Ann: Everybody out! Straight ahead.'")
     assert page.evaluate(SHOWN).startswith("Straight ahead\n9 m to go")

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, read_rows
-from echostep.offline.imu_checks import rate_complaint
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
 from echostep_app.offline import foreign_columns
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 

@@ -23,7 +23,7 @@ from echostep_app.plan.places.faces import OUTSIDE, beside
 from echostep_app.plan.places.spaces import find_spaces
 
 # Assumed:
-OUT_M = 0.6  # from a door: who has gone as far is outside
+OUT_M = 0.6  # from a door to the pose outside it
 DIRECTIONS = 72  # of the straight lines, one of which has to lead from an exit into the open past all walls
 NAMES = re.compile(r"\b(exit|entrance|entry|(not|haupt)?(aus|ein)gang|sortie|entr[ée]e|salida|entrada|uscita)\b", re.I)
 

@@ -76,7 +76,7 @@ def replay(
 
 
 def told_first(plan: Plan, recording: Recording, tracking: TrackingOptions) -> list[str]:
-    """What whoever tracks a recording is told before: that it is another plan, that no start is known."""
+    """Warnings before a recording is tracked: that it is another plan, that no start is known."""
     known = plan.start or tracking.start or {"start", "start_x_y_rad"} & recording.metadata.keys()
     anywhere = "No start is known, so the walk is sought anywhere: --start X,Y,DEG gives it."
     return [line for line in (plan_note(plan, recording), anywhere * (plan.is_drawn and not known)) if line]

@@ -48,7 +48,7 @@ class MarkFeed:
         return shown
 
     def answer_to(self, number: int) -> str:
-        """Who has the mayday of this number, as of the last call of `news`: a person, a commander's computer; empty while it has neither."""
+        """Where the mayday of this number has arrived, as of the last call of `news`: a person, a commander's computer; empty: nowhere yet."""
         team, name, run = self._key
         key = team, name, f"{run}-{number}"
         if ack := self._board.acks.get(key):
