@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from operation.teams import TOWER, ServedTeam, place, whole_team
-from page.browser import PHONE, TABLE_READY, kept, loaded_page, overflow, spot, violations, wait_for
+from page.browser import FRAMED, PHONE, TABLE_READY, kept, loaded_page, overflow, spot, violations, wait_for
 
 WIDE = {"viewport": {"width": 1280, "height": 720}}
 LOOKS: dict[str, dict[str, Any]] = {
@@ -60,7 +60,8 @@ def test_a_tap_on_the_map_or_on_the_list_shows_a_wearer_with_history(browser: An
         for name in ("Anna", "Gil"):
             team.hear(name, place(TOWER, 7.0, 2.0, 1))  # on one spot: their signs are beside each other
         served.show()
-        wait_for(page, "[...echostep.scene.places.values()].some(({ x }) => x === 7)")
+        wait_for(page, "[...echostep.scene.places.values()].filter(({ x, y }) => x === 7 && y === 2).length === 2")
+        page.evaluate(FRAMED)  # a tap finds the signs that are painted
         page.mouse.click(*spot(page, 7.0, 2.0))
         wait_for(page, "document.querySelector('#who').textContent.includes('Anna')")
         page.mouse.click(*np.add(spot(page, 7.0, 2.0), (16.0, -28.0)).tolist())
