@@ -185,6 +185,16 @@ def test_the_foot_takes_over_again() -> None:
     assert max(b.t_s - a.t_s for a, b in zip(estimates, estimates[1:], strict=False)) < 3.5
 
 
+def test_a_plug_that_is_loose_again_and_again_is_bridged_by_the_legs() -> None:
+    """For 1 to 5 s in turn, every 12 s; after a long one the foot has measured one stride before the next."""
+    scenario, chunks = walked(1)
+    for k in range(5):
+        chunks = tuple(without(chunks, MTX, 20.0 + 12.0 * k, 21.0 + 13.0 * k))
+    estimates, error = tracked(scenario, list(chunks))
+    assert error.max() < 0.5
+    assert np.mean([e.status is TrackStatus.TRACKING for e in estimates]) > 0.9
+
+
 @pytest.mark.parametrize("seed", [2, 3, 6, 9])
 def test_the_board_alone_is_enough(seed: int) -> None:
     """No MTx at all: one cable. Never a wrong place that is shown as sure."""

@@ -132,7 +132,10 @@ class FootLegsHandover:
         seen = (s for s in leg_segments if s.sd_m <= math.hypot(s.dx_m, s.dy_m))
         spans = [(max(s.t0_s, begin_s), min(s.t1_s, end_s)) for s in seen]
         foot_m, legs_m = (sum(_length_m(each, *at) for at in spans) for each in (self._kept_segments, leg_segments))
-        if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
+        if foot_m < MIN_OVERLAP_M:
+            if self._compared_m[0] == 0.0:  # in no earlier dropout either
+                return False
+        elif not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
             return False
         self._compared_m = (self._compared_m[0] + foot_m, self._compared_m[1] + legs_m)
         self._leg_scale = self._compared_m[0] / self._compared_m[1]
