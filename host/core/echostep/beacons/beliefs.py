@@ -97,10 +97,7 @@ def correct(
 def place_covariance(beliefs: BeaconBeliefs, slot: int, weight: Floats) -> Floats:
     """Covariance (2, 2) of the place of a beacon (m2): mean of the particles' own, and scatter of their means; `weight` (n,) sums to 1."""
     cov = weight @ beliefs.cov[:, slot][:, [XX, XY, XY, YY]]
-    covariance: Floats = cov.reshape(2, 2) + np.cov(
-        beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True
-    )
-    return covariance
+    return cov.reshape(2, 2) + np.cov(beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True)
 
 
 @kernel

@@ -181,7 +181,7 @@ class MtxReader:
         alike = index - np.maximum.accumulate(np.where(changed, index, -1 - self._alike))
         if len(index):
             self._last, self._alike = measured[-1:], int(alike[-1])
-        fresh: Bools = alike < HELD
+        fresh = alike < HELD
         held = int((~fresh).sum())
         self._tally[[gates.GOOD, gates.REPEATED]] += (-held, held)
         return fresh
