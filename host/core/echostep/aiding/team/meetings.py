@@ -60,7 +60,7 @@ def information(meeting: Meeting, mean: Floats) -> Floats:
     """Inverse covariance (2, 2) of the wearer's place by the meeting; for a radio range only along the line from the teammate to `mean` (2,)."""
     spread = covariance(meeting)
     if meeting.range_m is None:
-        return np.linalg.inv(spread)
+        return np.asarray(np.linalg.inv(spread), np.float64)
     away = (mean - [meeting.x_m, meeting.y_m])[None]
     along = _along(away)[0]
     return np.outer(along, along) / _range_variance(meeting, away, spread)[0]
