@@ -59,8 +59,8 @@ def set_beliefs(
 
 
 @part
-def place_dropped(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
-    """Beliefs of a beacon that was just dropped: it lies about each particle (x, y), each (n,), within this variance (m2); its axis is unknown."""
+def place_beacon(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
+    """Give each particle a belief of its own of one beacon: it lies about (x, y), each (n,), within this variance (m2); its axis is unknown."""
     for i in range(len(beliefs.mean)):
         beliefs.mean[i, slot] = x[i], y[i], 0.0
         beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, math.pi * math.pi
