@@ -28,13 +28,12 @@ from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
 from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, names_of_blocks, rooms_of, written
-from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
+from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet, storeys_of
 from echostep_app.plan.importers.dxf.storeys import (
     Box,
     alignment,
     beside_house,
     bounds_of,
-    in_order,
     lies_over,
     storey_boxes,
     window_words,
@@ -101,6 +100,8 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     if hints.windows and len(files) > 1:
         raise EchostepError(f"{files[1]}: --window is for one drawing with several storeys: give one file")
     sheets = [read_sheet(file, hints, report) for file in files]
+    if not hints.windows:
+        sheets = [storey for sheet in sheets for storey in storeys_of(sheet, report)]
     report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
     frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
     if (frame.x0_m, frame.y0_m) != (0.0, 0.0):
@@ -109,16 +110,24 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     if hints.windows:
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
     _lay_over(storeys, hints, report)
-    usual = [file.stem for file in files] if len(storeys) == len(files) else [f"level {i}" for i in range(len(storeys))]
+    usual = [
+        storey.sheet.storey or (f"level {i}" if hints.windows[1:] else storey.sheet.file.stem)
+        for i, storey in enumerate(storeys)
+    ]
     names = [*hints.level_names, *usual[len(hints.level_names) :]]
-    if (order := in_order(names)) != names:
-        report.doubt(f"by their names the storeys are {', '.join(order)[:99]} from the lowest: give them in this order")
     drawn_levels = [
-        _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
+        _drawn_level(storey, DrawnLevel(name, _height_m(storeys, i, hints)), report)
         for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
     ]
     plan = plan_of(files[0].stem, drawn_levels, report)
     return plan if any(level.rooms for level in plan.levels) else _with_names(plan, storeys, report)
+
+
+def _height_m(storeys: list[_Storey], i: int, hints: Hints) -> float:
+    """Height of a level: by its walls where one drawing tells that of all, else a usual one."""
+    heights = [storey.sheet.height_m for storey in storeys]
+    drawn = heights[i]
+    return round(i * hints.storey_height_m if drawn is None or heights.count(0.0) > 1 else drawn, 6)
 
 
 def _with_names(plan: Plan, storeys: list[_Storey], report: ImportReport) -> Plan:
@@ -176,7 +185,7 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             storeys[k] = _moved(storey, dx, dy)
         elif not over:
             report.doubt(
-                f"{storey.sheet.file.name} does not lie over {first.file.name}: --align lays the storeys over each other"
+                f"{storey.sheet.storey or storey.sheet.file.name} does not lie over {first.storey or first.file.name}: --align lays the storeys over each other"
             )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,13 +75,16 @@ class VisibleEntities:
                 self._hidden[str(layer.dxf.name).casefold()] = "frozen" if layer.is_frozen() else "off"
         self.references: list[str] = []
 
-    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
-        """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
-        stack: list[tuple[Any, str, int, BaseGeometry | None]]
-        stack = [(entity, "0", 0, None) for entity in reversed(list(self._space))]
+    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str, Sequence[str]]]:
+        """Each entity with its layer, and the names of the blocks around it, the outermost first; layer "0" inside a block means the block's layer.
+
+        Blocks are expanded unless `whole(layer)`.
+        """
+        stack: list[tuple[Any, str, tuple[str, ...], int, BaseGeometry | None]]
+        stack = [(entity, "0", (), 0, None) for entity in reversed(list(self._space))]
         count = inserts = 0
         while stack:
-            entity, outer, depth, shown = stack.pop()
+            entity, outer, blocks, depth, shown = stack.pop()
             count += depth > 0
             if count > MOST_PARTS:
                 raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
@@ -96,15 +99,16 @@ class VisibleEntities:
                 inserts += 1
                 for attribute in entity.attribs:
                     attribute.dxf.owner = f"insert {inserts}"  # those of one block name one room; copies have no owner
-                    stack.append((attribute, layer, depth + 1, shown))
+                    stack.append((attribute, layer, blocks, depth + 1, shown))
                 if self._is_reference(entity):
                     continue
                 shown = shown_of(entity, shown)
             for seen in [entity] if shown is None or is_block else clipped(entity, shown):
-                yield seen, layer
+                yield seen, layer, blocks
             if is_block and not whole(layer):
                 inner = parts(entity, self._file) if depth < DEEPEST_BLOCK else []
-                stack += [(part, layer, depth + 1, shown) for part in inner]
+                around = (*blocks, str(entity.dxf.name))
+                stack += [(part, layer, around, depth + 1, shown) for part in inner]
                 if not inner and not entity.attribs:
                     self._report.leave_out(f"INSERT without contents on {layer[:40]}")
 

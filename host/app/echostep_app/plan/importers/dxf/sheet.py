@@ -1,28 +1,42 @@
 # SPDX-License-Identifier: MIT
-"""One drawing file, its entities sorted by the kind of their layers, and its scale.
+"""One drawing file, its entities sorted by the kind of their layers and by the storeys that are drawn over each other, and its scale.
 
-In: a file, hints. Out: `Sheet`. Owns when a drawing is refused for its layers.
+In: a file, hints. Out: `Sheet`s. Owns when a drawing is refused for its layers, and by what its storeys are told apart.
 """
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
+
+from shapely.geometry import LineString
 
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.entities import VisibleEntities, read_drawing
 from echostep_app.plan.importers.dxf.frame import METRES, DrawingFrame
 from echostep_app.plan.importers.dxf.layers import BESIDE, EXITS, faces_m, matches, meaning, patterns_of
 from echostep_app.plan.importers.dxf.measures import lengths_of
+from echostep_app.plan.importers.dxf.storeys import bounds_of, drawn_over, has_room, window_words
 from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_unit
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.storey_names import StoreyName, storey_of
 
 MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed
 MOST_NAMES = 20  # of layers in an error
+MOST_COMPARED, SAME = 6, 0.99  # layers of walls; share from which two are the same; assumed
+NAMED = ": another storey? End the names of its layers with _L1, those of the lower one with _L0: each is a level then"
+LEAST_STOREY_M, TOUCH_M = (
+    2.0,
+    0.05,
+)  # of a floor from the one below; of the head of a wall from what stands on it; assumed
 Layered = list[tuple[Any, str]]  # entities with their layers
 
 
@@ -30,7 +44,8 @@ Layered = list[tuple[Any, str]]  # entities with their layers
 class Sheet:
     """`kinds`: entities by the meaning of their layers; `others`: those on layers without one.
 
-    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it.
+    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it. `named`: by the entities' ids,
+    the storeys that their layers or blocks name. `storey`: the words for this one; `height_m`: of its walls; where it is one of several.
     """
 
     file: Path
@@ -40,6 +55,9 @@ class Sheet:
     words: str
     unit: str | None
     alike: tuple[str, ...] = ()
+    named: Mapping[int, StoreyName] = field(default_factory=dict)
+    storey: str = ""
+    height_m: float | None = None
 
     @property
     def walls(self) -> list[Any]:
@@ -54,11 +72,14 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     visible = VisibleEntities(drawing, file, report)
     kinds: dict[str, Layered] = {kind: [] for kind in patterns}
     others: Layered = []
-    known: dict[str, str | None] = {}
-    for entity, layer in visible(lambda layer: meaning(layer, patterns) == "doors"):
-        kind = known[layer] if layer in known else known.setdefault(layer, meaning(layer, patterns))
+    known, storey = cache(lambda layer: meaning(layer, patterns)), cache(storey_of)
+    named: dict[int, StoreyName] = {}
+    for entity, layer, blocks in visible(lambda layer: known(layer) == "doors"):
+        kind = known(layer)
         if entity.dxftype() != "INSERT" or kind == "doors":
             (others if kind is None else kinds[kind]).append((entity, layer))
+            own = next((found for name in (layer, *blocks) if (found := storey(name))), None)
+            named |= {} if own is None else {id(entity): own}
     for name in visible.references:
         report.doubt(f"{name} is an external reference, so not in the file: bind it (XREF, Bind) or give that drawing")
     if not kinds["walls"]:
@@ -69,7 +90,7 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     else:
         scale_m, words = scale_of(drawing, lengths, hints.units, file, report)
         unit = None if hints.units else stated_unit(drawing)
-    sheet = Sheet(file, kinds, others, scale_m, words, unit)
+    sheet = Sheet(file, kinds, others, scale_m, words, unit, (), named)
     return replace(sheet, alike=_tell(sheet, report, asks="walls" not in hints.layers))
 
 
@@ -86,9 +107,17 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
         report.leave_out(what, count)
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
-    if not alike:
+    used = _lines(sheet.walls, frame)
+    used_m = sum(line.length for line in used)
+    over = [
+        layer
+        for layer, _ in alike
+        if storey_of(layer) is None and _is_storey_over(_on(sheet.others, layer, frame), used)
+    ]
+    if over:
+        report.doubt(f"what looks like walls on {over[0]} lies over the walls used{NAMED}")
+    if not (alike := [row for row in alike if row[0] not in over]):
         return ()
-    used_m = sum(line.length for entity in sheet.walls for line in frame.raw(entity))
     words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
     advice = " ".join(
         f"--layer walls={_quoted(layer)}" for layer in [*report.layers["walls"], *(name for name, _ in alike)][:6]
@@ -102,16 +131,115 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
     return tuple(layer for layer, _ in alike)
 
 
+def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
+    """A sheet for each storey that is drawn over another one, the lowest first; they are told. One where none is."""
+    frame, by = DrawingFrame(sheet.scale_m), "names of layers or blocks"
+    names, homes = _named(sheet, frame)
+    if len(names) < 2:
+        by, bases = "heights of walls", _bases(sheet, frame)
+        names = {k: f"{base_m:g} m" for k, base_m in enumerate(bases)}
+        pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row]
+        homes = {id(entity): _home(entity, frame, bases) for entity, _ in pairs}
+    if len(names) < 2:
+        _tell_layers_over(sheet, frame, report)
+        return [sheet]
+    parts = [_part(sheet, homes, names, number) for number in sorted(names)]
+    lines = [_lines(part.walls, frame) for part in parts]
+    told = ", ".join(part.storey for part in parts)[:99]
+    if not any(drawn_over(low, high) for low, high in pairwise(lines)):
+        report.doubt(
+            f"{sheet.file.name}: the {by} tell storeys ({told}) that do not lie over each other: taken as one level"
+        )
+        return [sheet]
+    both = {layer for pair in sheet.kinds.values() for entity, layer in pair if homes.get(id(entity)) not in names}
+    window = window_words([bounds_of([line for row in lines for line in row])], sheet.scale_m)
+    report.doubt(
+        f"{sheet.file.name}: {len(parts)} storeys over each other by the {by}, {told}, are levels; {window} takes them as one"
+        + (f"; on all of them: {', '.join(sorted(both))[:99]}" if both else "")
+    )
+    lows = [min(frame.heights(entity)[0] for entity in part.walls) for part in parts]
+    if all(high - low >= LEAST_STOREY_M for low, high in pairwise(lows)):
+        parts = [replace(part, height_m=low - lows[0]) for part, low in zip(parts, lows, strict=True)]
+    return parts
+
+
+def _tell_layers_over(sheet: Sheet, frame: DrawingFrame, report: ImportReport) -> None:
+    """Report layers of walls that look like storeys over each other; those that are the same are one, drawn and filled."""
+    layers = Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)
+    lines = {layer: _on(sheet.kinds["walls"], layer, frame) for layer, _ in layers[1:] and layers}
+    for one, other in combinations(lines, 2):
+        if _is_storey_over(lines[one], lines[other], SAME):
+            report.doubt(f"what is on {one} lies over what is on {other}{NAMED}")
+            return
+
+
+def _is_storey_over(one: list[LineString], other: list[LineString], most: float = math.inf) -> bool:
+    return has_room(one) and has_room(other) and drawn_over(one, other, most)
+
+
+def _named(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
+    """Words of the storeys that walls name, by their numbers, and the numbers of entities, by their ids; walls without one may be one more."""
+    homes = {key: storey.number for key, storey in sheet.named.items()}
+    names = {storey.number: storey.words for entity in sheet.walls if (storey := sheet.named.get(id(entity)))}
+    rest = {id(entity): layer for entity, layer in sheet.kinds["walls"] if id(entity) not in homes}
+    if names and rest:
+        own, others = (
+            _lines([entity for entity in sheet.walls if (id(entity) in rest) is is_rest], frame)
+            for is_rest in (True, False)
+        )
+        if _is_storey_over(own, others):
+            lowest = min(0, *names) - 1
+            names[lowest] = next(iter(rest.values()))
+            homes |= dict.fromkeys(rest, lowest)
+    return names, homes
+
+
+def _on(pairs: Layered, layer: str, frame: DrawingFrame) -> list[LineString]:
+    return _lines([entity for entity, own in pairs if own == layer], frame)
+
+
+def _lines(entities: Sequence[Any], frame: DrawingFrame) -> list[LineString]:
+    return [line for entity in entities for line in frame.raw(entity)]
+
+
+def _part(sheet: Sheet, homes: Mapping[int, int], names: Mapping[int, str], number: int) -> Sheet:
+    """What is on one storey, or on none of those that walls are on."""
+
+    def own(pairs: Layered) -> Layered:
+        return [pair for pair in pairs if homes.get(id(pair[0])) == number or homes.get(id(pair[0])) not in names]
+
+    kinds = {kind: own(pairs) for kind, pairs in sheet.kinds.items()}
+    return replace(sheet, kinds=kinds, others=own(sheet.others), storey=names[number])
+
+
+def _bases(sheet: Sheet, frame: DrawingFrame) -> list[float]:
+    """Heights (m) of the floors that walls stand on, from the lowest; walls that enclose no room stand on no floor of their own."""
+    bands: list[tuple[float, float]] = []
+    for low, high in sorted({frame.heights(entity) for entity in sheet.walls}):
+        base, top = bands[-1] if bands else (-math.inf, -math.inf)
+        if low < max(top - TOUCH_M, base + LEAST_STOREY_M) or (low == high and base < top and low - top < TOUCH_M):
+            bands[-1] = base, max(top, high)
+        else:
+            bands.append((low, high))
+    lines: dict[int, list[LineString]] = {}
+    bases = [base for base, _ in bands]
+    for entity in sheet.walls if len(bands) > 1 else ():
+        lines.setdefault(_home(entity, frame, bases), []).extend(frame.raw(entity))
+    return [base for k, base in enumerate(bases) if has_room(lines.get(k, []))]
+
+
+def _home(entity: Any, frame: DrawingFrame, bases: Sequence[float]) -> int:
+    """The number of the floor that an entity lies on or above."""
+    return max(bisect_right(bases, frame.heights(entity)[0] + TOUCH_M) - 1, 0)
+
+
 def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:
     """Layers whose lines look like faces of walls, and their length (m), the longest first."""
     by_layer: dict[str, list[Any]] = {}
     for entity, layer in pairs:
         if not matches(layer, (*BESIDE, *EXITS)):
             by_layer.setdefault(layer, []).append(entity)
-    lengths = {
-        layer: faces_m([line for entity in entities for line in frame.raw(entity)])
-        for layer, entities in by_layer.items()
-    }
+    lengths = {layer: faces_m(_lines(entities, frame)) for layer, entities in by_layer.items()}
     return sorted(((layer, length) for layer, length in lengths.items() if length), key=lambda row: -row[1])
 
 
