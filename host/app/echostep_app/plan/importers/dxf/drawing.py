@@ -27,8 +27,9 @@ from echostep_app.plan.importers.dxf.doors import PlacedDoors
 from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
+from echostep_app.plan.importers.dxf.layers import WAYS, matches
 from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, names_of_blocks, rooms_of, written
-from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet, storeys_of
+from echostep_app.plan.importers.dxf.sheet import Layered, Sheet, read_sheet, storeys_of
 from echostep_app.plan.importers.dxf.storeys import (
     Box,
     alignment,
@@ -47,6 +48,7 @@ from echostep_app.plan.importers.dxf.symbols import (
     paired,
     symbol_of,
     symbols_of,
+    with_leaf,
 )
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
@@ -86,8 +88,9 @@ class _Storey:
         return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
 
     def texts(self) -> list[Written]:
-        """The texts on layers that mean nothing else."""
-        found = (written(entity, layer, self.frame) for entity, layer in self.sheet.others)
+        """The texts among the walls, and on layers that mean nothing else; those of ways out are no names."""
+        pairs = (pair for pair in (*self.sheet.others, *self.sheet.kinds["walls"]) if not matches(pair[1], WAYS))
+        found = (written(entity, layer, self.frame) for entity, layer in pairs)
         return names_of_blocks([text for text in found if text is not None and self.holds(Point(text.room.at_m))])
 
     def holds(self, shape: BaseGeometry) -> bool:
@@ -241,8 +244,7 @@ def _without_lines(storey: _Storey, report: ImportReport) -> None:
 def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     """Doors on their layers, then swings on others, or among the walls, that fit a gap exactly."""
     placed = PlacedDoors()
-    kinds = storey.sheet.kinds
-    curves = [p for p in (*storey.sheet.others, *kinds["walls"], *kinds["windows"]) if p[0].dxftype() in CURVES]
+    curves = [pair for pair in _besides_doors(storey) if pair[0].dxftype() in CURVES]
     swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
     storey.swings.update(id(entity) for entity, *_ in swings)  # not walls while doors are looked for
     walls = WallBands(storey.lines("walls", "columns", "windows"))
@@ -283,23 +285,35 @@ def _swings_elsewhere(
             for entity, layer, swing in (left.pop(id(line)) for line in pair.lines):
                 other = next((one.hinge for one in pair.swings if one.hinge != swing.hinge), swing.hinge)
                 doors.append((entity, layer, swing, other))
+    drawn = [line for entity, _ in _besides_doors(storey) for line in storey.of(entity)] if left else []
+    tree = shapely.STRtree(drawn)
+    for key, (entity, layer, swing) in list(left.items()):
+        near = [drawn[k] for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M)]
+        if (line := placed.add_through(with_leaf(swing, near), walls)) is not None:
+            doors.append((entity, layer, swing, line[2:]))
+            del left[key]
     storey.swings.difference_update(id(entity) for entity, _, _ in left.values())
     for entity, layer, _, _ in doors:
         report.use("doors", layer)
         report.take_back(f"{entity.dxftype()} on {layer[:40]}")
-    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors])
+    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors], report)
 
 
-def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
-    """Leaves drawn open at a door's swing count as neither walls nor windows."""
-    kinds = storey.sheet.kinds
-    drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
-    tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])
+def _besides_doors(storey: _Storey) -> Layered:
+    """Entities among which a swing or a leaf may be drawn, on no layer of doors."""
+    return [*storey.sheet.others, *storey.sheet.kinds["walls"], *storey.sheet.kinds["windows"]]
+
+
+def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]], report: ImportReport) -> None:
+    """Leaves drawn open at a door's swing count as neither walls nor windows, nor as left out."""
+    drawn = [(*pair, lines) for pair in _besides_doors(storey) if leaves and (lines := storey.of(pair[0]))]
+    tree = shapely.STRtree([lines[0] for *_, lines in drawn])
     for swing, closed in leaves:
         for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
-            entity, lines = drawn[k]
-            if draws_open_leaf(lines, swing, closed):
+            entity, layer, lines = drawn[k]
+            if id(entity) not in storey.swings and draws_open_leaf(lines, swing, closed):
                 storey.swings.add(id(entity))
+                report.take_back(f"{entity.dxftype()} on {layer[:40]}")
 
 
 def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
@@ -309,6 +323,10 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
     if placed.cuts:
         one = len(placed.cuts) == 1
         report.doubt(f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: it was cut")
+    if placed.asked:
+        report.doubt(
+            f"arcs like doors' in walls that are drawn through ({len(placed.asked)}): echostep plan edit asks about each"
+        )
     if placed.strays:
         places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1

@@ -40,6 +40,10 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
+    if not raw.startswith(BINARY) and b"SECTION" not in raw:
+        raise EchostepError(
+            f"{file}: not a DXF drawing: {'no SECTION in it' if raw.strip() else 'it is empty'}: save it as DXF"
+        )
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # no messages about single values; the audit counts them
     try:
         if raw.startswith(BINARY):

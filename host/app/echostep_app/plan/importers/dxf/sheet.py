@@ -21,7 +21,7 @@ from shapely.geometry import LineString
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.entities import VisibleEntities, read_drawing
 from echostep_app.plan.importers.dxf.frame import METRES, DrawingFrame
-from echostep_app.plan.importers.dxf.layers import BESIDE, EXITS, faces_m, matches, meaning, patterns_of
+from echostep_app.plan.importers.dxf.layers import BESIDE, WAYS, faces_m, matches, meaning, patterns_of
 from echostep_app.plan.importers.dxf.measures import lengths_of
 from echostep_app.plan.importers.dxf.storeys import bounds_of, drawn_over, has_room, window_words
 from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_unit
@@ -237,7 +237,7 @@ def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:
     """Layers whose lines look like faces of walls, and their length (m), the longest first."""
     by_layer: dict[str, list[Any]] = {}
     for entity, layer in pairs:
-        if not matches(layer, (*BESIDE, *EXITS)):
+        if not matches(layer, (*BESIDE, *WAYS)):
             by_layer.setdefault(layer, []).append(entity)
     lengths = {layer: faces_m(_lines(entities, frame)) for layer, entities in by_layer.items()}
     return sorted(((layer, length) for layer, length in lengths.items() if length), key=lambda row: -row[1])
@@ -257,7 +257,8 @@ def _no_walls(
         return EchostepError(
             f"{file}: the drawing only refers to {', '.join(references)[:200]} (external reference): bind it (XREF, Bind), or give that file"
         )
-    if not everything and any(len(drawing.layouts.get(name)) > 1 for name in drawing.layout_names() if name != "Model"):
+    least = max(1, len(everything))
+    if any(len(drawing.layouts.get(name)) > least for name in drawing.layout_names() if name != "Model"):
         return EchostepError(f"{file}: it is on a layout (paper space) alone: copy it to the model space (CHSPACE)")
     names = [layer for layer, _ in Counter(layer for _, layer in everything).most_common(MOST_NAMES)]
     unit = likely_unit(lengths_of({"walls": [entity for entity, _ in everything], "doors": [], "rooms": []}, file))
