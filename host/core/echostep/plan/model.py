@@ -216,8 +216,7 @@ def load_plan(path: Path | str) -> Plan:
     try:
         return parse_plan(raw)
     except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
-        remedy = f"of another format ({formats}), echostep plan import makes one"
+        remedy = "of another format (DXF, IMDF, OSM, IFC or GeoJSON), echostep plan import makes one"
         raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
@@ -226,13 +225,28 @@ def load_plan(path: Path | str) -> Plan:
 def parse_plan(raw: bytes) -> Plan:
     """Parse the bytes of a plan file; raises ValueError that names the field."""
     try:
-        tree = json.loads(raw)
-    except (ValueError, RecursionError) as error:
+        tree = json.loads(raw, object_pairs_hook=_once)
+    except RecursionError as error:
+        raise ValueError("lists or objects are nested too deep") from error
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
         if what := replaced(raw[:32]):
             raise ValueError(what) from error
         where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
         raise NotJsonError(f"not a plan: it is not JSON{where}") from error
+    except ValueError as error:
+        raise ValueError("a number has too many digits" if str(error).startswith("Exceeds") else error) from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose keys stand once."""
+    tree = dict(pairs)
+    if len(tree) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(
+            f"the field {short(next(key for key in tree if keys.count(key) > 1))} stands twice: delete one"
+        )
+    return tree
 
 
 def _plan(tree: Any, digest: str) -> Plan:

@@ -55,7 +55,7 @@ def storey_of(name: str) -> StoreyName | None:
         for token in TOKEN.finditer(name.casefold().replace("\u2212", "-"))
     ]
     tokens = [token for token in found if token[0] not in BESIDE]
-    storeys = {}
+    storeys: dict[int, str] = {}
     for k in range(len(tokens)):
         if (named := _named(tokens, k)) is not None:
             number, used = named
