@@ -16,17 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
 from echostep.plan import Level, Plan
-from echostep_app.plan.places.faces import (
-    JAMB_M,
-    OUTSIDE,
-    TOUCH_M,
-    Faces,
-    door_faces,
-    extend,
-    faces_under,
-    find_faces,
-    is_walled,
-)
+from echostep_app.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces, is_walled
 from echostep_app.plan.places.findings import Lines, PlanFinding
 from echostep_app.plan.places.gaps import with_gaps
 from echostep_app.plan.places.reachability import narrowest_opening, unreachable_rooms
@@ -47,12 +37,7 @@ def check_plan(plan: Plan) -> list[PlanFinding]:
     passable = replace(plan, levels=tuple(with_gaps(level) for level in plan.levels))
     faces = [find_faces(level) for level in passable.levels]
     findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
-    findings += [
-        *unreachable_rooms(passable, faces),
-        *_connectors(passable, faces),
-        *_start(plan),
-        *_no_exit(passable, faces),
-    ]
+    findings += [*unreachable_rooms(passable, faces), *_connectors(passable, faces), *_start(plan)]
     findings.sort(key=lambda finding: finding.level)
     not_enclosed = [k for k, finding in enumerate(findings) if finding.text.endswith(NOT_ENCLOSED)]
     for k in not_enclosed[:MOST_LEAKS]:
@@ -124,9 +109,8 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
             text = f"door {door.name or number} is {door.width_m:.3g} m wide: is the plan in metres?"
             yield PlanFinding("door", i, at, text, lines)
         if is_walled(door, tree):
-            yield PlanFinding(
-                "door", i, at, f"a wall runs through {name} or along it: doors are gaps in the walls", lines
-            )
+            text = f"a wall runs through {name} or along it: doors are gaps in the walls"
+            yield PlanFinding("door", i, at, text, lines)
 
 
 def _distance(tree: shapely.STRtree, point: shapely.Point) -> float:
@@ -152,14 +136,6 @@ def _with_leak(finding: PlanFinding, level: Level) -> PlanFinding:
     x, y, width = gap
     text = f"{finding.text}; the narrowest way out is {width:g} m wide or less"
     return replace(finding, position_m=(x, y), text=text, lines_m=((*finding.position_m, x, y),))
-
-
-def _no_exit(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFinding]:
-    """A house of several levels with doors or gaps of which none leads outside; one level may be a part of a house."""
-    pairs = [door_faces(level.doors, of) for level, of in zip(plan.levels, faces, strict=True)]
-    if len(pairs) > 1 and any(pairs) and not any(OUTSIDE in pair for level in pairs for pair in level):
-        i = next(i for i, level in enumerate(pairs) if level)
-        yield PlanFinding("no exit", i, _middle(plan.levels[i]), "no door and no gap leads outside: nobody gets out")
 
 
 def _start(plan: Plan) -> Iterator[PlanFinding]:

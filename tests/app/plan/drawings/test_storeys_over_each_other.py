@@ -37,7 +37,7 @@ def test_layers_that_name_storeys(tmp_path: Path, low: str, high: str, names: li
     assert [level.name for level in plan.levels] == names
     assert gaps_m(plan) == [3.0, 5.0]
     assert (
-        f"2 storeys over each other by the names of layers or blocks, {', '.join(names)}, are levels"
+        f"by the names of layers or blocks it has the storeys {', '.join(names)}, over each other"
         in report.doubts[0]
     )
     one, _ = imported(doc, tmp_path, windows=[(-1, -1, 11, 9)])
@@ -72,7 +72,7 @@ def test_heights_of_walls(tmp_path: Path) -> None:
     assert [(level.height_m, len(level.doors)) for level in plan.levels] == [(0.0, 1), (3.2, 1)]
     assert [[room.name for room in level.rooms] for level in plan.levels] == [["Hall 112"], ["Hall 115.2"]]
     assert gaps_m(plan) == [3.0, 5.0]
-    assert "by the heights of walls, 112 m, 115.2 m, are levels" in report.doubts[0]
+    assert "by the heights of walls it has the storeys 112 m, 115.2 m, over each other" in report.doubts[0]
 
 
 @pytest.mark.parametrize("tall", [0.0, 2.7, 3.0])
@@ -108,7 +108,7 @@ def test_kinds_of_partitions_are_no_storeys(tmp_path: Path) -> None:
         outlines(space, box, "A-WALL-P1" if k < 4 else "A-WALL-P2")
     plan, report = imported(doc, tmp_path)
     assert len(plan.levels) == 1
-    assert "storeys (P1, P2) that do not lie over each other" in report.doubts[0]
+    assert "storeys P1, P2, but they do not lie over each other" in report.doubts[0]
 
 
 @pytest.mark.parametrize("other", ["A-WALL-X", "X-17"])

@@ -12,30 +12,20 @@ from typing import NamedTuple
 
 # Words that name a storey without a number; 99 is the top
 ALONE = {
-    **dict.fromkeys(("eg", "erdgeschoss", "ground", "gf", "rdc", "rez", "pb", "pt", "terra", "baja", "begane", "parterre"), 0),
-    **dict.fromkeys(("og", "obergeschoss", "ff"), 1), "sf": 2, "tf": 3, **dict.fromkeys(("dg", "dachgeschoss", "attic", "combles"), 99),
+    **dict.fromkeys("eg erdgeschoss ground gf rdc rez pb pt terra baja begane parterre".split(), 0), "og": 1, "obergeschoss": 1, "ff": 1, "sf": 2, "tf": 3,
+    **dict.fromkeys("dg dachgeschoss attic combles".split(), 99),
 }  # fmt: skip
 # Words that need a number beside them; those below are the first one without it
 ABOVE = {
-    "og", "obergeschoss", "stock", "geschoss", "etage", "étage", "niveau", "niv", "floor", "storey", "story", "level", "lvl", "ebene", "piso", "planta",
-    "piano", "verdieping",
-}  # fmt: skip
-BELOW = {"kg", "ug", "keller", "kellergeschoss", "untergeschoss", "basement", "souterrain", "sous", "sótano", "sotano", "interrato", "kelder"}  # fmt: skip
+    *"og obergeschoss stock geschoss etage étage niveau niv floor storey story level lvl ebene piso planta piano verdieping".split()
+}
+BELOW = {*"kg ug keller kellergeschoss untergeschoss basement souterrain sous sótano sotano interrato kelder".split()}
 CODES = {
     **dict.fromkeys("lpefn", 1),
     **dict.fromkeys("bus", -1),
 }  # letters before a number without a space, as L1, P2, B1
 MOST_CODED, MOST, LONGEST = 20, 99, 4  # storeys; greater numbers are measures; letters of a number
-SPELT = {
-    "first": "1",
-    "second": "2",
-    "third": "3",
-    "fourth": "4",
-    "fifth": "5",
-    "premier": "1",
-    "primer": "1",
-    "primo": "1",
-}
+SPELT = {"first": "1", "second": "2", "third": "3", "fourth": "4", "premier": "1", "primer": "1", "primo": "1"}
 BESIDE = {"st", "nd", "rd", "th", "er", "ème", "eme", "º", "ª", "sol"}  # between a number and its word
 TOKEN = re.compile(r"(?<![^\W_])r[+-]\d{1,2}(?!\d)|(?:(?<=\s)|^)-\d+|\d+|[^\W\d_]+")
 Token = tuple[str, int, int]  # a word or a number, where it begins and ends

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Floats
 from echostep.plan import Level, Plan, Room
 from echostep_app.plan.cropping import within
-from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, connected_groups, door_faces, leader_of
+from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, beside, connected_groups, door_faces, leader_of
 from echostep_app.plan.places.findings import PlanFinding
 
 PART, HOLLOW_M = 0.25, 0.6  # of a level's area, from which it is told; narrower spaces are insides of walls; assumed
@@ -34,8 +34,14 @@ def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFindin
     rooms, home = _groups_of_rooms(plan, faces, leader)
     yield from _parts(plan, faces, leader, {group for *_, group in rooms}, home)
     apart = [(i, room, f) for i, room, f, group in rooms if group != home]
+    pairs = [door_faces(level.doors, of) for level, of in zip(plan.levels, faces, strict=True)]
+    if len(pairs) > 1 and any(pairs) and not any(OUTSIDE in pair for level in pairs for pair in level):
+        i = next(i for i, level in enumerate(pairs) if level)  # one level may be a part of a house
+        yield PlanFinding(
+            "no exit", i, beside(plan.levels[i].doors[0])[0], "no door and no gap leads outside: nobody gets out"
+        )
     for i, level in enumerate(plan.levels):
-        with_door = {f for pair in door_faces(level.doors, faces[i]) for f in pair}
+        with_door = {f for pair in pairs[i] for f in pair}
         closed = [room for k, room, f in apart if k == i and f not in with_door]
         many = len(closed) >= MANY_CLOSED
         if many:

@@ -36,10 +36,7 @@ SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across 
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
 # Of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
 THINNEST_PANEL_M, EVEN, FOLDED = (0.1, 1.3, 1.3)
-THROUGH = (
-    "a wall was drawn through this door, and cut: is it a door?",
-    "an arc like a door's, and a wall drawn through it: is it a door?",
-)
+THROUGH = "a wall was drawn through this door, and cut: is it a door?", "an arc like a door's at a wall: is it a door?"
 Line = tuple[float, float, float, float]
 
 
@@ -47,8 +44,8 @@ Line = tuple[float, float, float, float]
 class PlacedDoors:
     """Doors in walls; `jambs`: ends of the adjacent walls, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
 
-    `strays`: middles of symbols in no wall, and their possible doors.
-    `asked`: lines of arcs like swings, without a leaf, at a wall that is drawn through them. `marks`: number of small shapes that are not doors: frames of numbers, jambs.
+    `strays`: middles of symbols in no wall, and their possible doors. `asked`: lines of arcs like swings without a leaf at walls drawn through them.
+    `marks`: number of small shapes that are not doors: frames of numbers, jambs.
     """
 
     doors: list[Door] = field(default_factory=list)
@@ -77,10 +74,23 @@ class PlacedDoors:
                 self._cut(line, walls)
 
     def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
-        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap or None."""
-        line = _exact(swing, walls) or _exact(swing, walls.wider())
-        if line is not None:
+        """Place a swing on no layer of doors, and return its line: in a gap that it fits exactly, or, with a leaf, at a wall drawn through it.
+
+        Without a leaf the latter is asked about.
+        """
+        if (line := _exact(swing, walls) or _exact(swing, walls.wider())) is not None:
             self._place(line, walls)
+            return line
+        closed = [end for k, end in enumerate(swing.ends) if k != swing.leaf and walls.is_at_wall(end)]
+        if len(closed) != 1 or not walls.is_at_wall(swing.hinge):
+            return None
+        line = (*swing.hinge, *closed[0])
+        if walls.gap(line[:2], _along(line), swing.radius_m / 2, swing.radius_m) is not None or self._has(line):
+            return None
+        if swing.leaf is None:
+            self.asked.append(line)
+            return None
+        self._cut(line, walls)
         return line
 
     def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
@@ -95,20 +105,6 @@ class PlacedDoors:
             return None
         self._place(lines[0], walls)
         return lines[0]
-
-    def add_through(self, swing: Swing, walls: WallBands) -> Line | None:
-        """Place a swing on no layer of doors at a wall that is drawn through it, and return its line; without a leaf it is asked about."""
-        closed = [end for k, end in enumerate(swing.ends) if k != swing.leaf and walls.is_at_wall(end)]
-        if len(closed) != 1 or not walls.is_at_wall(swing.hinge):
-            return None
-        line = (*swing.hinge, *closed[0])
-        if walls.gap(line[:2], _along(line), swing.radius_m / 2, swing.radius_m) is not None or self._has(line):
-            return None
-        if swing.leaf is None:
-            self.asked.append(line)
-            return None
-        self._cut(line, walls)
-        return line
 
     def _cut(self, line: Line, walls: WallBands) -> None:
         self.doors.append(Door(line))

@@ -114,8 +114,7 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
     _lay_over(storeys, hints, report)
     usual = [
-        storey.sheet.storey or (f"level {i}" if hints.windows[1:] else storey.sheet.file.stem)
-        for i, storey in enumerate(storeys)
+        f"level {i}" if hints.windows[1:] else one.sheet.storey or one.sheet.file.stem for i, one in enumerate(storeys)
     ]
     names = [*hints.level_names, *usual[len(hints.level_names) :]]
     drawn_levels = [
@@ -187,9 +186,8 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             dx, dy = alignment(walls[k], walls[0])
             storeys[k] = _moved(storey, dx, dy)
         elif not over:
-            report.doubt(
-                f"{storey.sheet.storey or storey.sheet.file.name} does not lie over {first.storey or first.file.name}: --align lays the storeys over each other"
-            )
+            one, other = (sheet.storey or sheet.file.name for sheet in (storey.sheet, first))
+            report.doubt(f"{one} does not lie over {other}: --align lays the storeys over each other")
 
 
 def _windows(storey: _Storey, boxes: Sequence[Box]) -> str:
@@ -274,46 +272,34 @@ def _swings_elsewhere(
     """Place swings on layers that are not of doors, single or in pairs; swings that fit no gap keep their layer's kind."""
     doors: list[tuple[Any, str, Swing, tuple[float, float]]] = []
     left: dict[int, tuple[Any, str, Swing]] = {}  # by id of the line, which the symbols of pairs keep
+    drawn = [(*pair, lines) for pair in _besides_doors(storey) if swings and (lines := storey.of(pair[0]))]
+    tree = shapely.STRtree([lines[0] for *_, lines in drawn])
     for entity, layer, symbol in swings:
-        gap = placed.add_swing(symbol.swings[0], walls)
-        if gap is None:
-            left |= {id(line): (entity, layer, symbol.swings[0]) for line in symbol.lines}
+        near = tree.query(Point(symbol.swings[0].hinge), predicate="dwithin", distance=LEAF_M)
+        swing = with_leaf(symbol.swings[0], [*symbol.lines, *(line for k in near for line in drawn[k][2])])
+        if (gap := placed.add_swing(swing, walls)) is None:
+            left |= {id(line): (entity, layer, swing) for line in symbol.lines}
         else:
-            doors.append((entity, layer, symbol.swings[0], gap[2:]))
+            doors.append((entity, layer, swing, gap[2:]))
     for pair in symbols_of([line for _, _, symbol in swings for line in symbol.lines if id(line) in left]):
         if len(pair.swings) == 2 and placed.add_pair(pair, walls) is not None:
             for entity, layer, swing in (left.pop(id(line)) for line in pair.lines):
                 other = next((one.hinge for one in pair.swings if one.hinge != swing.hinge), swing.hinge)
                 doors.append((entity, layer, swing, other))
-    drawn = [line for entity, _ in _besides_doors(storey) for line in storey.of(entity)] if left else []
-    tree = shapely.STRtree(drawn)
-    for key, (entity, layer, swing) in list(left.items()):
-        near = [drawn[k] for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M)]
-        if (line := placed.add_through(with_leaf(swing, near), walls)) is not None:
-            doors.append((entity, layer, swing, line[2:]))
-            del left[key]
     storey.swings.difference_update(id(entity) for entity, _, _ in left.values())
-    for entity, layer, _, _ in doors:
+    for entity, layer, swing, closed in doors:
         report.use("doors", layer)
         report.take_back(f"{entity.dxftype()} on {layer[:40]}")
-    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors], report)
+        for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
+            other, on, lines = drawn[k]
+            if id(other) not in storey.swings and draws_open_leaf(lines, swing, closed):
+                storey.swings.add(id(other))  # an open leaf is neither wall nor window, nor left out
+                report.take_back(f"{other.dxftype()} on {on[:40]}")
 
 
 def _besides_doors(storey: _Storey) -> Layered:
     """Entities among which a swing or a leaf may be drawn, on no layer of doors."""
     return [*storey.sheet.others, *storey.sheet.kinds["walls"], *storey.sheet.kinds["windows"]]
-
-
-def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]], report: ImportReport) -> None:
-    """Leaves drawn open at a door's swing count as neither walls nor windows, nor as left out."""
-    drawn = [(*pair, lines) for pair in _besides_doors(storey) if leaves and (lines := storey.of(pair[0]))]
-    tree = shapely.STRtree([lines[0] for *_, lines in drawn])
-    for swing, closed in leaves:
-        for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
-            entity, layer, lines = drawn[k]
-            if id(entity) not in storey.swings and draws_open_leaf(lines, swing, closed):
-                storey.swings.add(id(entity))
-                report.take_back(f"{entity.dxftype()} on {layer[:40]}")
 
 
 def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import combinations, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +44,8 @@ Layered = list[tuple[Any, str]]  # entities with their layers
 class Sheet:
     """`kinds`: entities by the meaning of their layers; `others`: those on layers without one.
 
-    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it. `named`: by the entities' ids,
-    the storeys that their layers or blocks name. `storey`: the words for this one; `height_m`: of its walls; where it is one of several.
+    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it. `named`: the storeys that
+    layers or blocks name, by the entities' ids. `storey`: the words for this one, `height_m`: of its walls, where it is one of several.
     """
 
     file: Path
@@ -107,13 +107,8 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
         report.leave_out(what, count)
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
-    used = _lines(sheet.walls, frame)
-    used_m = sum(line.length for line in used)
-    over = [
-        layer
-        for layer, _ in alike
-        if storey_of(layer) is None and _is_storey_over(_on(sheet.others, layer, frame), used)
-    ]
+    used_m = sum(line.length for line in _lines(sheet.walls, frame))
+    over = _over(sheet.others, [layer for layer, _ in alike], sheet, frame)
     if over:
         report.doubt(f"what looks like walls on {over[0]} lies over the walls used{NAMED}")
     if not (alike := [row for row in alike if row[0] not in over]):
@@ -136,84 +131,56 @@ def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
     frame, by = DrawingFrame(sheet.scale_m), "names of layers or blocks"
     names, homes = _named(sheet, frame)
     if len(names) < 2:
-        by, bases = "heights of walls", _bases(sheet, frame)
-        names = {k: f"{base_m:g} m" for k, base_m in enumerate(bases)}
-        pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row]
-        homes = {id(entity): _home(entity, frame, bases) for entity, _ in pairs}
+        by = "heights of walls"
+        names, homes = _lifted(sheet, frame)
     if len(names) < 2:
-        _tell_layers_over(sheet, frame, report)
+        layers = [layer for layer, _ in Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)]
+        for layer in _over(sheet.kinds["walls"], layers, sheet, frame)[-1:]:
+            report.doubt(f"what is on {layer} lies over the other walls{NAMED}")
         return [sheet]
     parts = [_part(sheet, homes, names, number) for number in sorted(names)]
     lines = [_lines(part.walls, frame) for part in parts]
-    told = ", ".join(part.storey for part in parts)[:99]
+    told = f"{sheet.file.name}: by the {by} it has the storeys {', '.join(part.storey for part in parts)[:99]}"
     if not any(drawn_over(low, high) for low, high in pairwise(lines)):
-        report.doubt(
-            f"{sheet.file.name}: the {by} tell storeys ({told}) that do not lie over each other: taken as one level"
-        )
+        report.doubt(f"{told}, but they do not lie over each other: taken as one level")
         return [sheet]
-    both = {layer for pair in sheet.kinds.values() for entity, layer in pair if homes.get(id(entity)) not in names}
-    window = window_words([bounds_of([line for row in lines for line in row])], sheet.scale_m)
-    report.doubt(
-        f"{sheet.file.name}: {len(parts)} storeys over each other by the {by}, {told}, are levels; {window} takes them as one"
-        + (f"; on all of them: {', '.join(sorted(both))[:99]}" if both else "")
+    both = sorted(
+        {layer for row in sheet.kinds.values() for entity, layer in row if homes.get(id(entity)) not in names}
     )
+    window = window_words([bounds_of([line for row in lines for line in row])], sheet.scale_m)
+    on_all = f"; on all of them: {', '.join(both)[:99]}" if both else ""
+    report.doubt(f"{told}, over each other: each is a level; {window} takes them as one{on_all}")
     lows = [min(frame.heights(entity)[0] for entity in part.walls) for part in parts]
     if all(high - low >= LEAST_STOREY_M for low, high in pairwise(lows)):
         parts = [replace(part, height_m=low - lows[0]) for part, low in zip(parts, lows, strict=True)]
     return parts
 
 
-def _tell_layers_over(sheet: Sheet, frame: DrawingFrame, report: ImportReport) -> None:
-    """Report layers of walls that look like storeys over each other; those that are the same are one, drawn and filled."""
-    layers = Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)
-    lines = {layer: _on(sheet.kinds["walls"], layer, frame) for layer, _ in layers[1:] and layers}
-    for one, other in combinations(lines, 2):
-        if _is_storey_over(lines[one], lines[other], SAME):
-            report.doubt(f"what is on {one} lies over what is on {other}{NAMED}")
-            return
-
-
-def _is_storey_over(one: list[LineString], other: list[LineString], most: float = math.inf) -> bool:
-    return has_room(one) and has_room(other) and drawn_over(one, other, most)
+def _part(sheet: Sheet, homes: Mapping[int, int], names: Mapping[int, str], number: int) -> Sheet:
+    """What is on one storey, or on none of those that walls are on."""
+    rows = {"": sheet.others, **sheet.kinds}
+    own = {kind: [pair for pair in row if homes.get(id(pair[0])) in (number, None)] for kind, row in rows.items()}
+    return replace(sheet, others=own.pop(""), kinds=own, storey=names[number])
 
 
 def _named(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
     """Words of the storeys that walls name, by their numbers, and the numbers of entities, by their ids; walls without one may be one more."""
     homes = {key: storey.number for key, storey in sheet.named.items()}
-    names = {storey.number: storey.words for entity in sheet.walls if (storey := sheet.named.get(id(entity)))}
-    rest = {id(entity): layer for entity, layer in sheet.kinds["walls"] if id(entity) not in homes}
-    if names and rest:
-        own, others = (
-            _lines([entity for entity in sheet.walls if (id(entity) in rest) is is_rest], frame)
-            for is_rest in (True, False)
-        )
-        if _is_storey_over(own, others):
-            lowest = min(0, *names) - 1
-            names[lowest] = next(iter(rest.values()))
-            homes |= dict.fromkeys(rest, lowest)
-    return names, homes
+    names = {homes[id(entity)]: sheet.named[id(entity)].words for entity in sheet.walls if id(entity) in homes}
+    rest = [pair for pair in sheet.kinds["walls"] if id(pair[0]) not in homes]
+    own, others = (
+        _lines([entity for entity, _ in rest], frame),
+        [entity for entity in sheet.walls if id(entity) in homes],
+    )
+    if names and has_room(own) and drawn_over(own, _lines(others, frame)):
+        lowest = min(0, *names) - 1
+        names[lowest] = rest[0][1]
+        homes |= {id(entity): lowest for entity, _ in rest}
+    return names, {key: number for key, number in homes.items() if number in names}
 
 
-def _on(pairs: Layered, layer: str, frame: DrawingFrame) -> list[LineString]:
-    return _lines([entity for entity, own in pairs if own == layer], frame)
-
-
-def _lines(entities: Sequence[Any], frame: DrawingFrame) -> list[LineString]:
-    return [line for entity in entities for line in frame.raw(entity)]
-
-
-def _part(sheet: Sheet, homes: Mapping[int, int], names: Mapping[int, str], number: int) -> Sheet:
-    """What is on one storey, or on none of those that walls are on."""
-
-    def own(pairs: Layered) -> Layered:
-        return [pair for pair in pairs if homes.get(id(pair[0])) == number or homes.get(id(pair[0])) not in names]
-
-    kinds = {kind: own(pairs) for kind, pairs in sheet.kinds.items()}
-    return replace(sheet, kinds=kinds, others=own(sheet.others), storey=names[number])
-
-
-def _bases(sheet: Sheet, frame: DrawingFrame) -> list[float]:
-    """Heights (m) of the floors that walls stand on, from the lowest; walls that enclose no room stand on no floor of their own."""
+def _lifted(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
+    """As `_named`, by the heights of the floors that walls stand on; walls that enclose no room stand on no floor of their own."""
     bands: list[tuple[float, float]] = []
     for low, high in sorted({frame.heights(entity) for entity in sheet.walls}):
         base, top = bands[-1] if bands else (-math.inf, -math.inf)
@@ -221,16 +188,33 @@ def _bases(sheet: Sheet, frame: DrawingFrame) -> list[float]:
             bands[-1] = base, max(top, high)
         else:
             bands.append((low, high))
-    lines: dict[int, list[LineString]] = {}
+
+    def home(entity: Any) -> int:
+        return max(bisect_right(bases, frame.heights(entity)[0] + TOUCH_M) - 1, 0)
+
     bases = [base for base, _ in bands]
-    for entity in sheet.walls if len(bands) > 1 else ():
-        lines.setdefault(_home(entity, frame, bases), []).extend(frame.raw(entity))
-    return [base for k, base in enumerate(bases) if has_room(lines.get(k, []))]
+    if len(bases) > 1:
+        rooms = [
+            has_room(_lines([entity for entity in sheet.walls if home(entity) == k], frame)) for k in range(len(bases))
+        ]
+        bases = [base for base, is_floor in zip(bases, rooms, strict=True) if is_floor]
+    pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row if len(bases) > 1]
+    return {k: f"{base:g} m" for k, base in enumerate(bases)}, {id(entity): home(entity) for entity, _ in pairs}
 
 
-def _home(entity: Any, frame: DrawingFrame, bases: Sequence[float]) -> int:
-    """The number of the floor that an entity lies on or above."""
-    return max(bisect_right(bases, frame.heights(entity)[0] + TOUCH_M) - 1, 0)
+def _over(pairs: Layered, layers: Sequence[str], sheet: Sheet, frame: DrawingFrame) -> list[str]:
+    """Which layers look like another storey over the walls on other layers, though no word names it; the same walls, drawn and filled, are one."""
+    found = []
+    for layer in layers if layers[1:] or pairs is sheet.others else ():
+        own = _lines([entity for entity, on in pairs if on == layer], frame)
+        rest = _lines([entity for entity, on in sheet.kinds["walls"] if on != layer], frame)
+        if storey_of(layer) is None and has_room(own) and has_room(rest) and drawn_over(own, rest, SAME):
+            found.append(layer)
+    return found
+
+
+def _lines(entities: Sequence[Any], frame: DrawingFrame) -> list[LineString]:
+    return [line for entity in entities for line in frame.raw(entity)]
 
 
 def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:

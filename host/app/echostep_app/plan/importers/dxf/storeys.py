@@ -20,7 +20,7 @@ from echostep_app.plan.importers.straight import pieces_of
 APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
 BORDER_M = 0.6  # a border is further from what it frames: more than a thick wall; assumed
-SHARES = (1.0, 0.5, 0.25)  # of that distance, tried in this order; assumed
+LEAST_SHARE_APART = 0.25  # of that distance: a detail may lie close to a storey; assumed
 LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
 ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
 OVER = 0.3  # share of the smaller level's rectangle that lies over the other one's, in one building; assumed
@@ -34,17 +34,10 @@ Box = tuple[float, float, float, float]
 
 
 def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
-    """Rectangles (m) of groups of walls that look like storeys drawn side by side; one rectangle when there is one group.
-
-    A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
-    """
+    """Rectangles (m) of groups of walls that look like storeys drawn side by side; one rectangle when there is one group."""
     lines = np.array(list(walls), dtype=object)
     lines = lines[~_is_border(lines)]
-    nearest = _groups(lines, SHARES[-1])
-    if len(nearest) == 1:  # then it is one group by larger distances, too
-        return _storeys(lines, nearest)
-    tried = (_storeys(lines, nearest if share == SHARES[-1] else _groups(lines, share)) for share in SHARES)
-    return next((found for found in tried if len(found) > 1), _storeys(lines, nearest))
+    return _storeys(lines, _groups(lines, LEAST_SHARE_APART))
 
 
 def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:

@@ -37,12 +37,8 @@ OPEN = {
 }  # fmt: skip
 FILLED = {"structure", "column", "opentobelow", "brick", "concrete", "drywall", "wood", "glass"}
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
-    "stairs": "stairs",
-    "steps": "stairs",
-    "escalator": "stairs",
-    "elevator": "lift",
-    "ramp": "ramp",
-}
+    "stairs": "stairs", "steps": "stairs", "escalator": "stairs", "elevator": "lift", "ramp": "ramp",
+}  # fmt: skip
 SOLID_FIXTURES = {
     "wall", "obstruction", "equipment", "desk", "furniture", "baggagecarousel", "waterfeature", "vegetation",
 }  # fmt: skip

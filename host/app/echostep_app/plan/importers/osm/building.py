@@ -27,7 +27,6 @@ from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, areas, room
 from echostep_app.plan.importers.osm.elements import Elements, Tags, levels_of, read_osm
 from echostep_app.plan.importers.report import ImportReport
-from echostep_app.plan.importers.storey_names import in_order
 from echostep_app.plan.importers.straight import merge_collinear, pieces_of
 
 DOOR_M, STAIRS_M, LIFT_M = 0.9, 1.5, 1.8  # widths where the map states none: usual sizes
@@ -68,8 +67,7 @@ def import_osm(path: Path, storey_m: float, report: ImportReport) -> Plan:
         raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
     site = OsmSite({level: DrawnLevel(f"level {level:g}", round(level * storey_m, 6)) for level in levels}, levels)
     _without_level(elements, report)
-    _tell_heights(elements, levels, report)
-    _outlines(site, elements)
+    _outlines(site, elements, report)
     _spaces(site, elements)
     _doors(site, elements, report)
     _lifts(site, elements)
@@ -108,27 +106,6 @@ def _without_level(elements: Elements, report: ImportReport) -> None:
         )
 
 
-def _tell_heights(elements: Elements, levels: list[float], report: ImportReport) -> None:
-    """Report buildings that state another number of levels than their indoor elements have, and levels whose level:ref are in another order."""
-    above = sum(level >= 0 for level in levels)
-    for where, _, tags in elements.lines():
-        stated = tags.get("building:levels", "")
-        if _is_outline(tags) and stated.isdecimal() and len(stated) < 4 and int(stated) < above:
-            report.doubt(
-                f"{where}: building:levels={stated}, but indoor elements are on {above} levels from 0 up: these are taken"
-            )
-    named = {
-        levels_of(tags)[0]: tags["level:ref"][:20]
-        for _, _, tags in elements.lines()
-        if "level:ref" in tags and levels_of(tags)
-    }
-    names = [named[level] for level in sorted(named)]
-    if (order := in_order(names)) != names:
-        report.doubt(
-            f"by level:ref the levels are {', '.join(order)[:99]} from the lowest, by level {', '.join(names)[:99]}: level is taken"
-        )
-
-
 def _other(elements: Elements, report: ImportReport) -> None:
     """Report elements with tags that plans do not have: shops, furniture, footpaths, groups."""
     walls = ("room", "wall", "column", "pillar", "area", "corridor", "level")
@@ -154,13 +131,18 @@ def _origin(elements: Elements, path: Path) -> Georeference:
     return Georeference(float(lon), float(lat))
 
 
-def _outlines(site: OsmSite, elements: Elements) -> None:
+def _outlines(site: OsmSite, elements: Elements, report: ImportReport) -> None:
     """Add the outlines of buildings as walls, on each of their levels."""
     for where, nodes, tags in elements.lines():
         if _is_outline(tags):
             least = tags.get("building:min_level") or tags.get("min_level")
             own = levels_of(tags, where) or [k for k in site.order if _within(k, least, tags.get("max_level"))]
             _wall(site, elements, nodes, own, tags)
+            above, stated = sum(level >= 0 for level in site.order), tags.get("building:levels", "")
+            if re.fullmatch(r"\d{1,3}", stated, re.ASCII) and int(stated) < above:
+                report.doubt(
+                    f"{where}: building:levels={stated}, but indoor elements are on {above} levels from 0 up: these are taken"
+                )
             site.outside |= dict.fromkeys(nodes, own)
 
 
