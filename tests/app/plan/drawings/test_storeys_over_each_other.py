@@ -37,8 +37,7 @@ def test_layers_that_name_storeys(tmp_path: Path, low: str, high: str, names: li
     assert [level.name for level in plan.levels] == names
     assert gaps_m(plan) == [3.0, 5.0]
     assert (
-        f"by the names of layers or blocks it has the storeys {', '.join(names)}, over each other"
-        in report.doubts[0]
+        f"by the names of layers or blocks it has the storeys {', '.join(names)}, over each other" in report.doubts[0]
     )
     one, _ = imported(doc, tmp_path, windows=[(-1, -1, 11, 9)])
     assert len(one.levels) == 1

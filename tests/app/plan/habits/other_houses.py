@@ -58,7 +58,7 @@ def two_buildings(rows: Rows) -> None:
             points = feature["geometry"]["coordinates"]
             for ring in points if feature["geometry"]["type"] == "Polygon" else [points]:
                 ring[:] = [[x + 15 / 67_114.0, y] for x, y in ring]
-            rows[kind].append(feature)
+            features.append(feature)
 
 
 def names_turned(rows: Rows) -> None:

@@ -165,7 +165,7 @@ OSM = [
             {"level": "0;1;2"}, {"level": "0-2"}, {"level": "0 ; 1-2;"}, {"level": "0", "repeat_on": "1;2"}, {"level": "0", "repeat_on": "1-2"},
         ))),
         *cells(kind, "level ranges", rows(kind, level={"level": "0,1,2"}), rows(kind, level={"level": "0..2"}), asks="write level=0;1 or level=0-2"),
-        *cells(kind, "contradictions", rows(kind, level={"level": "0-2", "building": "yes", "building:levels": "2"}), asks="building:levels=2, but indoor elements are on 3 levels"),
+        *cells(kind, "contradictions", rows(kind, level={"level": "0-2", "building": "yes", "building:levels": "2"}), asks="building:levels=2, but"),
         *cells(kind, "spellings", rows(kind, sign=-1), rows(kind, entrance="entrance")),
         *cells(kind, "units", rows(kind, partial(osm.tagged, width="90 cm"))),
         *cells(kind, "units", *(rows(kind, partial(osm.tagged, width=wide)) for wide in ("90", "900", "wide")), asks="write it in metres"),
@@ -232,7 +232,7 @@ IMDF = [
     *cells("imdf", "thick walls", beside(0.08), beside(0.19)),
     *cells("imdf", "thick walls", beside(0.4), asks="openings lie in no wall"),
     *cells("imdf", "copied storeys", altered(lambda files: [f["properties"].update(ordinal=0) for f in files["level"]]), asks="m apart"),
-    *cells("imdf", "two buildings", altered(other.two_buildings), asks=r"^level 0: 2\d\.\d\d x 8.*beside each other, as of several buildings, are one level"),
+    *cells("imdf", "two buildings", altered(other.two_buildings), asks=r"^level 0: 2\d\.\d\d x 8.*as of several buildings, are one level"),
     *cells("imdf", "contradictions", altered(other.names_turned), asks="by their names the storeys are Ground floor, First floor, Level 2"),
     *moved("own", other.own, Right()),
 ]  # fmt: skip

@@ -12,14 +12,27 @@ from typing import NamedTuple
 
 # Words that name a storey without a number; 99 is the top
 ALONE = {
-    **dict.fromkeys("eg erdgeschoss ground gf rdc rez pb pt terra baja begane parterre".split(), 0), "og": 1, "obergeschoss": 1, "ff": 1, "sf": 2, "tf": 3,
-    **dict.fromkeys("dg dachgeschoss attic combles".split(), 99),
+    **dict.fromkeys(("eg", "erdgeschoss", "ground", "gf", "rdc", "rez", "pb", "pt", "terra", "baja", "begane", "parterre"), 0), "sf": 2, "tf": 3,
+    **dict.fromkeys(("og", "obergeschoss", "ff"), 1), **dict.fromkeys(("dg", "dachgeschoss", "attic", "combles"), 99),
 }  # fmt: skip
 # Words that need a number beside them; those below are the first one without it
 ABOVE = {
-    *"og obergeschoss stock geschoss etage étage niveau niv floor storey story level lvl ebene piso planta piano verdieping".split()
+    "og", "obergeschoss", "stock", "geschoss", "etage", "étage", "niveau", "niv", "floor", "storey", "story", "level", "lvl", "ebene", "piso",
+    "planta", "piano", "verdieping",
+}  # fmt: skip
+BELOW = {
+    "kg",
+    "ug",
+    "keller",
+    "kellergeschoss",
+    "untergeschoss",
+    "basement",
+    "souterrain",
+    "sous",
+    "sótano",
+    "sotano",
+    "interrato",
 }
-BELOW = {*"kg ug keller kellergeschoss untergeschoss basement souterrain sous sótano sotano interrato kelder".split()}
 CODES = {
     **dict.fromkeys("lpefn", 1),
     **dict.fromkeys("bus", -1),

@@ -92,10 +92,10 @@ class VisibleEntities:
             count += depth > 0
             if count > MOST_PARTS:
                 raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
-            own = _layer_of(entity)
+            own = str(_stated(entity, "layer", "0"))
             layer = outer if own == "0" else own
             is_block = entity.dxftype() == "INSERT"
-            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _is_invisible(entity) else None)
+            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _stated(entity, "invisible", 0) else None)
             if hidden and not (is_block and hidden == "off"):
                 self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
                 continue
@@ -128,24 +128,14 @@ class VisibleEntities:
         return True
 
 
-def _layer_of(entity: Any) -> str:
-    """The layer of an entity; "0" for unknown kinds, which ezdxf keeps without attributes."""
+def _stated(entity: Any, name: str, otherwise: Any) -> Any:
+    """An attribute of an entity; `otherwise` for unknown kinds, which ezdxf keeps without attributes."""
     from ezdxf.lldxf.const import DXFError
 
     try:
-        return str(entity.dxf.layer)
+        return entity.dxf.get(name, otherwise)
     except (AttributeError, DXFError):
-        return "0"
-
-
-def _is_invisible(entity: Any) -> bool:
-    """Whether an entity itself is hidden; False for an unknown kind."""
-    from ezdxf.lldxf.const import DXFError
-
-    try:
-        return bool(entity.dxf.get("invisible", 0))
-    except (AttributeError, DXFError):
-        return False
+        return otherwise
 
 
 def parts(insert: Any, file: Path) -> list[Any]:

@@ -7,6 +7,7 @@ In: a file, hints. Out: `Sheet`s. Owns when a drawing is refused for its layers,
 from __future__ import annotations
 
 import math
+import shlex
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -114,9 +115,7 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
     if not (alike := [row for row in alike if row[0] not in over]):
         return ()
     words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
-    advice = " ".join(
-        f"--layer walls={_quoted(layer)}" for layer in [*report.layers["walls"], *(name for name, _ in alike)][:6]
-    )
+    advice = _advice([*report.layers["walls"], *(name for name, _ in alike)][:6])
     if asks and sum(length for _, length in alike) > MOST_MORE * used_m:
         raise EchostepError(
             f"{sheet.file}: the layers named as walls have {used_m:.0f} m of lines; more that looks like walls is on {words}: give {advice}, "
@@ -250,7 +249,7 @@ def _no_walls(
     columns = " but columns" if kinds["columns"] else ""
     if alike:
         words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
-        advice = " ".join(f"--layer walls={_quoted(layer)}" for layer, _ in alike[:4])
+        advice = _advice([layer for layer, _ in alike[:4]])
         return EchostepError(
             f"{file}: no layer has the name of walls{columns}; what looks like walls is on {words}: give {advice}"
         )
@@ -260,5 +259,6 @@ def _no_walls(
     )
 
 
-def _quoted(layer: str) -> str:
-    return f"'{layer}'" if any(letter in layer for letter in " '*?[]()&;|$") else layer
+def _advice(layers: Sequence[str]) -> str:
+    """Options that take layers as walls."""
+    return " ".join(f"--layer walls={shlex.quote(layer)}" for layer in layers)
