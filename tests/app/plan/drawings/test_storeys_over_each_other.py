@@ -33,6 +33,7 @@ def test_layers_that_name_storeys(tmp_path: Path, low: str, high: str, names: li
     doc, space = sheet()
     for layer, begin in ((high, 5.0), (low, 3.0)) if is_turned else ((low, 3.0), (high, 5.0)):
         house(space, layer, begin=begin)
+    space.add_text("wall", dxfattribs={"layer": "A-WALL-L9", "insert": (1, 1)})
     plan, report = imported(doc, tmp_path)
     assert [level.name for level in plan.levels] == names
     assert gaps_m(plan) == [3.0, 5.0]

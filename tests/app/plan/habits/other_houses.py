@@ -52,7 +52,7 @@ def imdf(folder: Path, move: Move, change: Callable[[Rows], Any] = id, **more: A
 
 def two_buildings(rows: Rows) -> None:
     """The house once more, 15 m to the east."""
-    for kind, features in rows.items():
+    for features in rows.values():
         text = json.dumps(features).replace('"id": "L', '"id": "M').replace('"level_id": "L', '"level_id": "M')
         for feature in json.loads(text):
             points = feature["geometry"]["coordinates"]

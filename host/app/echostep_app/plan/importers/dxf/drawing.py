@@ -117,19 +117,15 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
         f"level {i}" if hints.windows[1:] else one.sheet.storey or one.sheet.file.stem for i, one in enumerate(storeys)
     ]
     names = [*hints.level_names, *usual[len(hints.level_names) :]]
+    heights = [one.sheet.height_m for one in storeys]  # known where one drawing has all of them
+    if None in heights or heights.count(0.0) > 1:
+        heights = [k * hints.storey_height_m for k in range(len(storeys))]
     drawn_levels = [
-        _drawn_level(storey, DrawnLevel(name, _height_m(storeys, i, hints)), report)
-        for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
+        _drawn_level(storey, DrawnLevel(name, round(height_m or 0.0, 6)), report)
+        for storey, name, height_m in zip(storeys, names, heights, strict=False)
     ]
     plan = plan_of(files[0].stem, drawn_levels, report)
     return plan if any(level.rooms for level in plan.levels) else _with_names(plan, storeys, report)
-
-
-def _height_m(storeys: list[_Storey], i: int, hints: Hints) -> float:
-    """Height of a level: by its walls where one drawing tells that of all, else a usual one."""
-    heights = [storey.sheet.height_m for storey in storeys]
-    drawn = heights[i]
-    return round(i * hints.storey_height_m if drawn is None or heights.count(0.0) > 1 else drawn, 6)
 
 
 def _with_names(plan: Plan, storeys: list[_Storey], report: ImportReport) -> Plan:

@@ -32,6 +32,7 @@ from echostep_app.plan.importers.storey_names import StoreyName, storey_of
 
 MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed
 MOST_NAMES = 20  # of layers in an error
+MOST_STOREYS = 200  # over each other
 MOST_COMPARED, SAME = 6, 0.99  # layers of walls; share from which two are the same; assumed
 NAMED = ": another storey? End the names of its layers with _L1, those of the lower one with _L0: each is a level then"
 LEAST_STOREY_M, TOUCH_M = (
@@ -109,7 +110,7 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
     used_m = sum(line.length for line in _lines(sheet.walls, frame))
-    over = _over(sheet.others, [layer for layer, _ in alike], sheet, frame)
+    over = _over([layer for layer, _ in alike], sheet, frame) if alike else []
     if over:
         report.doubt(f"what looks like walls on {over[0]} lies over the walls used{NAMED}")
     if not (alike := [row for row in alike if row[0] not in over]):
@@ -134,7 +135,7 @@ def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
         names, homes = _lifted(sheet, frame)
     if len(names) < 2:
         layers = [layer for layer, _ in Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)]
-        for layer in _over(sheet.kinds["walls"], layers, sheet, frame)[-1:]:
+        for layer in _over(layers, sheet, frame)[-1:]:
             report.doubt(f"what is on {layer} lies over the other walls{NAMED}")
         return [sheet]
     parts = [_part(sheet, homes, names, number) for number in sorted(names)]
@@ -165,13 +166,11 @@ def _part(sheet: Sheet, homes: Mapping[int, int], names: Mapping[int, str], numb
 def _named(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
     """Words of the storeys that walls name, by their numbers, and the numbers of entities, by their ids; walls without one may be one more."""
     homes = {key: storey.number for key, storey in sheet.named.items()}
-    names = {homes[id(entity)]: sheet.named[id(entity)].words for entity in sheet.walls if id(entity) in homes}
+    walls = [entity for entity in sheet.walls if id(entity) in homes and frame.raw(entity)]
+    names = {homes[id(entity)]: sheet.named[id(entity)].words for entity in walls}
     rest = [pair for pair in sheet.kinds["walls"] if id(pair[0]) not in homes]
-    own, others = (
-        _lines([entity for entity, _ in rest], frame),
-        [entity for entity in sheet.walls if id(entity) in homes],
-    )
-    if names and has_room(own) and drawn_over(own, _lines(others, frame)):
+    own = _lines([entity for entity, _ in rest if names], frame)
+    if has_room(own) and drawn_over(own, _lines(walls, frame)):
         lowest = min(0, *names) - 1
         names[lowest] = rest[0][1]
         homes |= {id(entity): lowest for entity, _ in rest}
@@ -192,21 +191,24 @@ def _lifted(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int
         return max(bisect_right(bases, frame.heights(entity)[0] + TOUCH_M) - 1, 0)
 
     bases = [base for base, _ in bands]
-    if len(bases) > 1:
-        rooms = [
-            has_room(_lines([entity for entity in sheet.walls if home(entity) == k], frame)) for k in range(len(bases))
-        ]
-        bases = [base for base, is_floor in zip(bases, rooms, strict=True) if is_floor]
+    on: dict[int, list[Any]] = {}
+    for entity in sheet.walls if 1 < len(bases) <= MOST_STOREYS else ():
+        on.setdefault(home(entity), []).append(entity)
+    bases = [base for k, base in enumerate(bases) if has_room(_lines(on.get(k, []), frame))]
     pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row if len(bases) > 1]
     return {k: f"{base:g} m" for k, base in enumerate(bases)}, {id(entity): home(entity) for entity, _ in pairs}
 
 
-def _over(pairs: Layered, layers: Sequence[str], sheet: Sheet, frame: DrawingFrame) -> list[str]:
+def _over(layers: Sequence[str], sheet: Sheet, frame: DrawingFrame) -> list[str]:
     """Which layers look like another storey over the walls on other layers, though no word names it; the same walls, drawn and filled, are one."""
+    used = {layer for _, layer in sheet.kinds["walls"]}
+    lines: dict[str, list[LineString]] = {layer: [] for layer in (*used, *layers)}
+    for entity, layer in (*sheet.kinds["walls"], *sheet.others) if used - {*layers[:1]} else ():
+        if layer in lines:
+            lines[layer] += frame.raw(entity)
     found = []
-    for layer in layers if layers[1:] or pairs is sheet.others else ():
-        own = _lines([entity for entity, on in pairs if on == layer], frame)
-        rest = _lines([entity for entity, on in sheet.kinds["walls"] if on != layer], frame)
+    for layer in layers:
+        own, rest = lines[layer], [line for other in used - {layer} for line in lines[other]]
         if storey_of(layer) is None and has_room(own) and has_room(rest) and drawn_over(own, rest, SAME):
             found.append(layer)
     return found
