@@ -21,7 +21,7 @@ from echostep_app.plan.cropping import within
 from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, beside, connected_groups, door_faces, leader_of
 from echostep_app.plan.places.findings import PlanFinding
 
-PART, HOLLOW_M = 0.25, 0.6  # of a level's area, from which it is told; narrower spaces are insides of walls; assumed
+PART, HOLLOW_M = 0.25, 1.3  # of a level's area, from which it is told; narrower spaces are insides of walls; assumed
 MANY_CLOSED = 5  # from this many rooms without a door on a level, their cause is reported once; assumed
 
 
