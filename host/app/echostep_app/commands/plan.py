@@ -154,10 +154,7 @@ PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), o
 
 
 @app.command()
-def check(
-    file: PlanFile,
-    picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None,
-) -> None:
+def check(file: PlanFile, picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None) -> None:
     """List the faults of a plan: exit status 0 without any, 1 otherwise."""
     from echostep_app.plan.check import check_plan
     from echostep_app.plan.importers.limited import open_limited
@@ -201,10 +198,7 @@ def show(
 
 
 @app.command()
-def overlay(
-    file: PlanFile,
-    out: Annotated[Path, out_option("FILE", "The overlay to write (.kmz).")],
-) -> None:
+def overlay(file: PlanFile, out: Annotated[Path, out_option("FILE", "The overlay to write (.kmz).")]) -> None:
     """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
     require(str(out), "matplotlib", "pyproj")
     from echostep_app.plan.importers.limited import open_limited

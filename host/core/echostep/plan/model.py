@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -215,24 +216,33 @@ def load_plan(path: Path | str) -> Plan:
         raise EchostepError(f"{path}: cannot read the plan: {error.strerror or error}: {remedy}") from error
     try:
         return parse_plan(raw)
-    except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
-        remedy = f"of another format ({formats}), echostep plan import makes one"
-        raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+        other = "; of another format (DXF, IMDF, OSM, IFC or GeoJSON), echostep plan import makes one"
+        raise EchostepError(f"{path}: {error}{other if isinstance(error, NotJsonError) else ''}") from error
 
 
 def parse_plan(raw: bytes) -> Plan:
     """Parse the bytes of a plan file; raises ValueError that names the field."""
     try:
-        tree = json.loads(raw)
+        tree = json.loads(raw, object_pairs_hook=_once)
     except (ValueError, RecursionError) as error:
         if what := replaced(raw[:32]):
             raise ValueError(what) from error
+        if isinstance(error, RecursionError) or str(error).startswith("Exceeds"):
+            raise ValueError("nested too deep, or a number has too many digits") from error
+        if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError):
+            raise
         where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
         raise NotJsonError(f"not a plan: it is not JSON{where}") from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose fields stand once."""
+    if len(tree := dict(pairs)) < len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"the field {short(twice)} stands twice: delete one")
+    return tree
 
 
 def _plan(tree: Any, digest: str) -> Plan:

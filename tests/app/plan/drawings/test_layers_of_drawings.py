@@ -173,6 +173,20 @@ def test_other_layers_that_look_like_walls_are_told(tmp_path: Path) -> None:
     assert len(plan.levels[0].walls) > 14
 
 
+@pytest.mark.parametrize("layer", ["ENTREE_SORTIE", "FLUCHTWEG", "EINGANG", "Issue de secours", "EVACUATION"])
+def test_ways_out_are_no_walls_and_their_texts_no_names(tmp_path: Path, layer: str) -> None:
+    doc, space = sheet()
+    house(space)
+    for y in (1.0, 5.0):
+        outlines(space, (9.7, y, 10.0, y + 2.0), layer)
+    space.add_text("Hall", dxfattribs={"layer": "A-WALL", "insert": (1, 2), "height": 0.2})
+    space.add_text("OUT", dxfattribs={"layer": layer, "insert": (6, 2), "height": 0.3})
+    plan, report = imported(doc, tmp_path)
+    assert [room.name for room in plan.levels[0].rooms] == ["Hall"]
+    assert plan.levels[0].questions == ()
+    assert report.left_out == {f"LWPOLYLINE on {layer}": 2, f"TEXT on {layer}": 1}
+
+
 def test_most_walls_on_another_layer_are_asked_for(tmp_path: Path) -> None:
     doc, space = sheet()
     house(space, "X-17")
