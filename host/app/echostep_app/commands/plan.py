@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep_app.commands.options import Browser, Lang, out_option, picture_option
+from echostep_app.commands.options import Browser, Lang, example, out_option, picture_option
 from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import say
 
@@ -79,7 +79,7 @@ Doors = Annotated[
 ]
 
 
-@app.command("import")
+@app.command("import", epilog=example("echostep plan import building.dxf --units mm -o plan.json"))
 def import_(
     files: Files,
     out: Annotated[Path, out_option("PLAN", "The plan to write (JSON).")],
@@ -153,7 +153,7 @@ def _without(letters: str) -> str:
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
 
 
-@app.command()
+@app.command(epilog=example("echostep plan check plan.json --picture faults.png"))
 def check(
     file: PlanFile,
     picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None,
