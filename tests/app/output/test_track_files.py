@@ -94,7 +94,9 @@ def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: li
     columns = parquet.read_table(export(folder, "track.parquet")).to_pydict()
     assert np.array_equal(np.column_stack((columns["longitude_deg"], columns["latitude_deg"])), expected)
     *points, line = json.loads(export(folder, "track.geojson").read_text())["features"]
-    assert [point["geometry"]["coordinates"] for point in points] == line["geometry"]["coordinates"] == expected.tolist()
+    assert (
+        [point["geometry"]["coordinates"] for point in points] == line["geometry"]["coordinates"] == expected.tolist()
+    )
     root = ET.parse(export(folder, "track.kml")).getroot()
     text = root.findtext(".//{*}LineString/{*}coordinates") or ""
     found = np.array([place.split(",") for place in text.split()], np.float64)

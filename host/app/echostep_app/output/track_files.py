@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, GeoJSON, KML, GPX, a TUM trajectory, or a recording with newly derived messages, chosen by the
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, GeoJSON, KML, GPX, a TUM trajectory, or a recording with newly derived messages, by the
 suffix of the file name. Owns nothing.
 """
 

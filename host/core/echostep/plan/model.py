@@ -28,7 +28,6 @@ from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, Pl
 FORMAT_VERSION = 1
 # Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
 MOST_PLACE_SD_M = 1.0
-WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
 def _no_segments() -> Floats:
@@ -160,7 +159,8 @@ class Georeference:
 class Plan:
     """A building; a notebook shows it as a picture.
 
-    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown.
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown. `picture`: of the one that the
+    plan is drawn over, metres a pixel and the place of its lower left corner.
     """
 
     name: str
@@ -170,6 +170,7 @@ class Plan:
     connectors: tuple[Connector, ...] = ()
     georeference: Georeference | None = None
     uncertainty_m: float | None = None
+    picture: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -216,8 +217,7 @@ def load_plan(path: Path | str) -> Plan:
     try:
         return parse_plan(raw)
     except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
-        remedy = f"of another format ({formats}), echostep plan import makes one"
+        remedy = "of another format (DXF, IMDF, OSM, IFC or GeoJSON), echostep plan import makes one"
         raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:
         raise EchostepError(f"{path}: {error}") from error
@@ -251,6 +251,7 @@ def _plan(tree: Any, digest: str) -> Plan:
         connectors=tuple(_connector(row, f"connectors[{i}]", names) for i, row in enumerate(fields.connectors)),
         georeference=None if geo is None else Georeference(*geo.origin, math.radians(geo.rotation_deg), geo.crs),
         uncertainty_m=fields.uncertainty_m,
+        picture=fields.picture,
     )
 
 
@@ -275,8 +276,7 @@ def _room(fields: RoomFields, where: str) -> Room:
 
 
 def _door(fields: DoorFields, where: str) -> Door:
-    if fields.line[:2] == fields.line[2:]:
-        raise ValueError(f"{where}.line: {WITHOUT_LENGTH}")
+    _segments([fields.line], f"{where}.line")
     return Door(fields.line, fields.state, fields.name)
 
 
@@ -305,8 +305,6 @@ def _level_index(reference: str | int, where: str, names: list[str]) -> int:
 
 def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
     """An outline of at least three corners -> (n, 2) float64; consecutive equal corners count as one."""
-    if len(points) > plan_file.MOST_CORNERS:
-        raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
     corners = [corner for corner, _ in groupby(points)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
@@ -320,5 +318,5 @@ def _segments(rows: Sequence[tuple[float, float, float, float]], where: str) -> 
     segments = np.array(rows, dtype=np.float64).reshape(-1, 4)
     without_length = (segments[:, :2] == segments[:, 2:]).all(axis=1)
     if without_length.any():
-        raise ValueError(f"{where}[{without_length.argmax()}]: {WITHOUT_LENGTH}")
+        raise ValueError(f"{where}[{without_length.argmax()}]: a wall without length: both ends are the same point")
     return segments

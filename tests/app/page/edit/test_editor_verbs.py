@@ -59,7 +59,7 @@ def test_the_scale_walls_and_doors(browser: Any, drawn: EditServer) -> None:
     page.click('[data-tool="scale"]')  # 400 px are 20 m at first; the rectangle's upper side is 15 m
     drag(page, (2.5, 12.5), (17.5, 12.5))
     answer(page, "7.5")
-    assert page.evaluate("echostep.sheet.picture.perPx") == pytest.approx(0.025, abs=1e-3)
+    assert page.evaluate("echostep.sheet.tree.picture") == [pytest.approx(0.025, abs=1e-3), 0, 0]
     page.click("#whole")
     page.click('[data-tool="wall"]')
     for place in ((3.01, 2.02), (8.02, 2.05), (8.04, 6.0), (8.04, 6.0)):

@@ -10,7 +10,6 @@ import { localise, missing, tr } from './language.js';
 import { Pointer } from './pointer.js';
 import { paintBar, stepOf } from './scale.js';
 import { Sheet } from './sheet.js';
-import { recall, remember } from './storage.js';
 import { startTheme } from './theme.js';
 import { Tools } from './tools.js';
 import { View } from './view.js';
@@ -18,7 +17,6 @@ import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
 const KEYS = { v: 'select', w: 'wall', d: 'door', n: 'room', s: 'scale' };
-const FIRST_WIDTH_M = 20; // of a picture without a scale
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false, checked = {};
 
@@ -49,12 +47,11 @@ function draw() {
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
   options.hidden = names.length < 2;
-  if (sheet.picture) remember(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture));
 }
 
 function show() {
-  const { picture } = sheet, rows = elementsOf(sheet.tree, sheet.k).flatMap((element) => element.rows);
-  view.fit(box(picture ? [...rows, [0, 0, picture.width * picture.perPx, picture.height * picture.perPx]] : rows));
+  const { picture } = sheet, rows = elementsOf(sheet.tree, sheet.k).flatMap((element) => element.rows), [perPx, x, y] = picture ? sheet.lies : [];
+  view.fit(box(picture ? [...rows, [x, y, x + picture.width * perPx, y + picture.height * perPx]] : rows));
   changed();
 }
 
@@ -163,7 +160,7 @@ function pick(name) {
   changed();
 }
 
-async function loadPicture(name) {
+async function loadPicture() {
   const answer = await fetch('picture');
   if (answer.status !== 200) return;
   const image = new Image();
@@ -173,10 +170,7 @@ async function loadPicture(name) {
   byId('image').setAttribute('href', image.src);
   byId('image').setAttribute('width', width);
   byId('image').setAttribute('height', height);
-  let kept = null;
-  try { kept = JSON.parse(recall(`picture of ${name}`)); } catch { /* not of this page */ }
-  const fits = kept?.width === width && kept.height === height && kept.perPx > 0;
-  sheet.picture = fits ? kept : { perPx: FIRST_WIDTH_M / width, width, height, set: false };
+  sheet.picture = { width, height };
 }
 
 async function start() {
@@ -185,7 +179,7 @@ async function start() {
   if (!answer.ok) { wrong(tree.error); return; }
   stamp = answer.headers.get('etag');
   sheet = new Sheet(tree, say);
-  await loadPicture(tree.name);
+  await loadPicture();
   tools = new Tools(sheet, view, { ask, say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
   asking = new Asking(sheet, view, tools, { say, changed });
   new Pointer(map, view, { down: (p, e) => tools.down(p, e.altKey || e.ctrlKey), move: (p) => tools.move(p), up: (p, isTap, e) => tools.up(p, isTap, e.shiftKey), cancel: () => { tools.cancel(); changed(); }, moved: changed });
@@ -205,7 +199,7 @@ async function start() {
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
   const asked = asking.open.length && WORDS.questions(asking.open.length);
-  say(sheet.picture && !sheet.picture.set ? WORDS.scaleFirst : asked || HINTS.select);
+  say(sheet.picture && !tree.picture ? WORDS.scaleFirst : asked || HINTS.select);
   window.echostep = { view, sheet, tools, asking, isOpen, missing, tr };
 }
 

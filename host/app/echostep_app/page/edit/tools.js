@@ -129,11 +129,11 @@ export class Tools {
   place(p) { this.desk.placed(p); }
 
   async scale(from, { at }) {
-    const { sheet, desk } = this, { picture } = sheet;
+    const { sheet, desk } = this;
     this.stop();
-    if (!picture) { desk.say(WORDS.noPicture); return; }
-    const metres = Number((await desk.ask(WORDS.distance, ''))?.replace(',', '.') ?? 0), perPx = picture.perPx * metres / distance(from, at);
-    if (metres > 0 && metres < 1e5 && Number.isFinite(perPx)) sheet.change(sheet.tree, WORDS.scaled(round(perPx)), { ...picture, perPx, set: true });
+    if (!sheet.picture) { desk.say(WORDS.noPicture); return; }
+    const [before, ...corner] = sheet.lies, metres = Number((await desk.ask(WORDS.distance, ''))?.replace(',', '.') ?? 0), perPx = before * metres / distance(from, at);
+    if (metres > 0 && metres < 1e5 && Number.isFinite(perPx)) sheet.change({ ...sheet.tree, picture: [perPx, ...corner] }, WORDS.scaled(round(perPx)));
     else desk.say(WORDS.noScale);
     desk.changed();
   }

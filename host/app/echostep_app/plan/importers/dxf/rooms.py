@@ -182,9 +182,7 @@ def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
         return None
     named = Room(words, (round(x, 3), round(y, 3)))
     block, tag = (entity.dxf.owner, entity.dxf.tag) if kind == "ATTRIB" else ("", "")
-    return Written(
-        named, frame.metres(about), height * frame.scale_m, turn, f"{kind} on {layer[:40]}", block, tag
-    )
+    return Written(named, frame.metres(about), height * frame.scale_m, turn, f"{kind} on {layer[:40]}", block, tag)
 
 
 def _placed(entity: Any, height: float) -> tuple[Any, Any, float]:
