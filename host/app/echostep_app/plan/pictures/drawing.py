@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of plans, PNG, SVG or PDF: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
+"""Pictures of plans, PNG, SVG or PDF: rooms, walls, windows, doors, exits, stairs and lifts, and the findings of the check.
 
 In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 """
@@ -17,6 +17,7 @@ import numpy as np
 from echostep.plan import Connector, Level, Plan, Pose, Room
 from echostep_app.plan.cropping import Bounds, extent, within
 from echostep_app.plan.pictures.labels import Label, draw_labels, fonts_for
+from echostep_app.plan.pictures.symbols import exit_lines
 from echostep_app.plan.places.faces import find_faces
 from echostep_app.plan.places.spaces import MOST_WALLS
 from echostep_app.printing.picture_files import check_picture, save_picture, svg_text
@@ -187,6 +188,8 @@ def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: S
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
     if plan.start is not None and plan.start.level == level_index:
         _draw_start(axes, plan.start)
+    for row in exit_lines(plan, level_index).tolist():
+        _draw_exit(axes, *row)
     for finding in findings:
         _mark(axes, finding)
     _draw_frame(axes, level, view)
@@ -247,6 +250,13 @@ def _draw_start(axes: Any, start: Pose) -> None:
     """A triangle at the start that points along its heading."""
     marker = (3, 0, math.degrees(start.heading_rad) - 90)
     axes.plot(start.x_m, start.y_m, marker=marker, color=WAY, markersize=9, zorder=6)
+
+
+def _draw_exit(axes: Any, x0: float, y0: float, x1: float, y1: float) -> None:
+    """The sign, in its box on the door, and the line out of it."""
+    axes.plot((x0, x1), (y0, y1), color=WAY_NAME, linewidth=1.5, zorder=6)
+    box = {"boxstyle": "square", "facecolor": WAY_NAME, "edgecolor": "none"}
+    axes.text(x0, y0, "EXIT", size=5, color="white", bbox=box, ha="center", va="center", clip_on=True, zorder=6)
 
 
 def _draw_frame(axes: Any, level: Level, view: View) -> None:
