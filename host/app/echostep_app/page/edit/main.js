@@ -2,7 +2,6 @@
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { Asking } from './asking.js';
-import { ask, isOpen } from './dialogs.js';
 import { elementsOf } from './elements.js';
 import { box } from './geometry.js';
 import { paint } from './paint.js';
@@ -138,8 +137,7 @@ function escape() {
 
 function key(e) {
   const ctrl = e.ctrlKey || e.metaKey, name = e.key.length === 1 ? e.key.toLowerCase() : e.key;
-  if (isOpen()) return;
-  if (e.key === '?' && document.activeElement.tagName !== 'INPUT') { byId('keys').classList.toggle('unseen'); return; }
+  if (e.key === '?') { byId('keys').classList.toggle('unseen'); return; }
   const always = ctrl && { s: save, z: () => turn(e.shiftKey ? 'redo' : 'undo'), y: () => turn('redo') }[name];
   if (always) { e.preventDefault(); always(); return; }
   if (ctrl || e.altKey || document.activeElement !== map) return;
@@ -180,7 +178,7 @@ async function start() {
   stamp = answer.headers.get('etag');
   sheet = new Sheet(tree, say);
   await loadPicture();
-  tools = new Tools(sheet, view, { ask, say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
+  tools = new Tools(sheet, view, { say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
   asking = new Asking(sheet, view, tools, { say, changed });
   new Pointer(map, view, { down: (p, e) => tools.down(p, e.altKey || e.ctrlKey), move: (p) => tools.move(p), up: (p, isTap, e) => tools.up(p, isTap, e.shiftKey), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
@@ -200,7 +198,7 @@ async function start() {
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
   const asked = asking.open.length && WORDS.questions(asking.open.length);
   say(sheet.picture && !tree.picture ? WORDS.scaleFirst : asked || HINTS.select);
-  window.echostep = { view, sheet, tools, asking, isOpen, missing, tr };
+  window.echostep = { view, sheet, tools, asking, missing, tr };
 }
 
 start().catch((error) => wrong(WORDS.noStart(error.message)));
