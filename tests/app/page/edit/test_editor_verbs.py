@@ -221,7 +221,7 @@ def test_what_is_wrong_is_gone_to(browser: Any, house: EditServer) -> None:
 def test_geometry(browser: Any, drawn: EditServer) -> None:
     page = opened(browser, drawn)
     rng = np.random.default_rng(7)
-    geometry = "import(location.href + 'static/geometry.js')"
+    geometry = "import(location.href + 'edit/geometry.js')"
     for _ in range(30):  # a door cut anywhere and closed again is the wall that was
         x0, y0, x1, y1 = wall = rng.uniform(-50, 50, 4).round(2).tolist()
         t = rng.random()

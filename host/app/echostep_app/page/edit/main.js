@@ -5,17 +5,18 @@ import { Asking } from './asking.js';
 import { elementsOf } from './elements.js';
 import { box } from './geometry.js';
 import { paint } from './paint.js';
-import { localise, missing, tr } from './language.js';
+import { localise, missing, tr } from '../static/language.js';
 import { Pointer } from './pointer.js';
-import { paintBar, stepOf } from './scale.js';
 import { Sheet } from './sheet.js';
-import { startTheme } from './theme.js';
+import { startTheme } from '../static/theme.js';
+import { showScale } from '../static/tools/units.js';
 import { Tools } from './tools.js';
-import { View } from './view.js';
+import { View } from '../static/view.js';
 import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
 const KEYS = { v: 'select', w: 'wall', d: 'door', n: 'room', s: 'scale' };
+const STEPS_M = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25, 50, 100, 250], STEP_PX = 14; // of an arrow key: the first that is so long
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false, checked = {};
 
@@ -32,7 +33,7 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
-  paintBar(view);
+  showScale(view);
   paint(tools, view, asking.current);
   const pressed = { rectangle: !tools.isLasso, lasso: tools.isLasso, add: tools.adds };
   for (const [id, is] of Object.entries(pressed)) byId(id).setAttribute('aria-pressed', String(is));
@@ -104,7 +105,7 @@ function turn(way) {
 }
 
 function step(e, [dx, dy]) {
-  const by = e.shiftKey ? 0.05 : stepOf(view), [x, y] = tools.cross;
+  const by = e.shiftKey ? 0.05 : STEPS_M.find((m) => m * view.scale >= STEP_PX) ?? STEPS_M.at(-1), [x, y] = tools.cross;
   tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
   view.keep(...tools.cross);
   if (!tools.draft && !tools.area) say(WORDS.cross(tools.cross));

@@ -3,8 +3,8 @@
 
 import { connectorsOf, startOn } from './elements.js';
 import { ends, length, middle } from './geometry.js';
-import { tr } from './language.js';
-import { halfOf, isFree } from './plan.js';
+import { tr } from '../static/language.js';
+import { halfOf, isFree } from '../static/plan.js';
 import { KINDS, WORDS } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';

@@ -3,7 +3,7 @@
 
 import { elementAt, elementsOf, elementsWithin, without } from './elements.js';
 import { cutDoor, distance, foot, length, onGrid, rectangle, round, same, snap } from './geometry.js';
-import { tr } from './language.js';
+import { tr } from '../static/language.js';
 import { questionAt } from './questions.js';
 import { WORDS } from './words.js';
 

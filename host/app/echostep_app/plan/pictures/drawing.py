@@ -37,6 +37,7 @@ LEVEL_WIDTH_PX = 900  # least width of a level
 GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
 BARE_DPI = 150  # of a picture without frame: lines are twice as wide in pixels as in points
 MANY = 20_000  # with more lines than this, pixels are drawn instead of lines
+# Of a finding's number
 BESIDE_RING_PT = (
     (9.0, 9.0),
     (9.0, -9.0),
@@ -46,7 +47,7 @@ BESIDE_RING_PT = (
     (0.0, -14.0),
     (16.0, 0.0),
     (-16.0, 0.0),
-)  # of a finding's number
+)
 MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
@@ -326,12 +327,4 @@ def _mark(axes: Any, finding: PlanFinding) -> None:
     """A ring at the finding's position, and the lines that are wrong."""
     for x0, y0, x1, y1 in finding.lines_m:
         axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
-    axes.plot(
-        *finding.position_m,
-        "o",
-        markersize=11,
-        markerfacecolor="none",
-        markeredgecolor=WRONG,
-        markeredgewidth=1.2,
-        zorder=8,
-    )
+    axes.plot(*finding.position_m, "o", ms=11, mfc="none", mec=WRONG, mew=1.2, zorder=8)

@@ -23,7 +23,7 @@ HALF_JAMB_M = 0.15  # of the tick across the wall at each side of a door
 TREAD_M = 0.3  # between two steps, of a common staircase
 MOST_TREADS = 16  # on one outline; a longer staircase has wider ones, so that they stay apart on a screen
 HEAD_SHARE = 0.15  # of a ramp's length: its arrow heads
-SIGN_M = 1.6  # from an exit's door to its sign outside
+SIGN_M = 1.0  # from the pose outside an exit to its sign
 
 
 def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
@@ -41,8 +41,7 @@ def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
 def exit_lines(plan: Plan, level: int) -> Floats:
     """A line (n, 4) from each exit of a level to where its sign stands outside."""
     out = [(e.x_m, e.y_m, math.cos(e.heading_rad), math.sin(e.heading_rad)) for e in plan.exits if e.level == level]
-    beyond_m = SIGN_M - OUT_M
-    rows = [(x - OUT_M * c, y - OUT_M * s, x + beyond_m * c, y + beyond_m * s) for x, y, c, s in out]
+    rows = [(x - OUT_M * c, y - OUT_M * s, x + SIGN_M * c, y + SIGN_M * s) for x, y, c, s in out]
     return np.array(rows).reshape(-1, 4)
 
 

@@ -156,13 +156,7 @@ def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
     lines = [text for text in words if text.height_m >= largest]
     for line in lines:
         report.take_back(line.what)
-    names: list[list[Written]] = []
-    for line in sorted(lines, key=lambda one: (-one.room.at_m[1], one.room.at_m[0])):
-        above = next((name for name in names if _follows(line, name[-1])), None)
-        if above is None:
-            names.append(above := [])
-        above.append(line)
-    return [Room(" ".join(line.room.name for line in name)[:80], name[0].room.at_m) for name in names]
+    return _stamps(lines, report)
 
 
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
