@@ -101,11 +101,6 @@ def test_without_a_board_the_counter_is_the_clock() -> None:
     assert np.allclose(np.diff(np.array(found, float)), 0.005)
 
 
-def test_messages_without_a_time_have_none() -> None:
-    timeline = Timeline(MtxTiming())
-    assert tell(timeline, [(BOARD, 77, 0, SILENT), (BOARD, 20_000, MS, PLAIN)]) == [None, pytest.approx(0.01)]
-
-
 def naive_times(messages: list[Message]) -> list[float | None]:
     timeline, found = naive_clocks.Timeline(MtxTiming()), []
     for port, value, t_ns, kind in messages:
