@@ -93,9 +93,10 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     """Room tags are often attributes of a block."""
     doc, space = with_gap()
     doc.blocks.new("TAG")
-    space.add_blockref("TAG", (2, 2), {"layer": "A-ROOM"}).add_attrib("NUMBER", "2.14", (2, 2), {"layer": "A-ROOM"})
-    assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2, 2))]
-    beside, layer = space.add_blockref("TAG", (6, 2), {"layer": "A-ROOM"}), {"layer": "A-ROOM", "height": 0.2}
+    layer = {"layer": "A-ROOM", "height": 0.2}
+    space.add_blockref("TAG", (2, 2), {"layer": "A-ROOM"}).add_attrib("NUMBER", "2.14", (2, 2), layer)
+    assert [(room.name, room.at_m) for room in imported(doc, tmp_path).levels[0].rooms] == [("2.14", (2.32, 2.1))]
+    beside = space.add_blockref("TAG", (6, 2), {"layer": "A-ROOM"})
     texts = {"NUMBER": "101", "ROOM_NAME": "Office", "DEPT": "Sales", "FINISH": "Carpet", "OCC": "Ann"}
     for k, (tag, text) in enumerate(texts.items()):
         beside.add_attrib(tag, text, (6 + 0.5 * (k % 2), 2 - 0.6 * k), layer)

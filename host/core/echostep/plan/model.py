@@ -29,7 +29,6 @@ from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, Pl
 FORMAT_VERSION = 1
 # Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
 MOST_PLACE_SD_M = 1.0
-WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
 def _no_segments() -> Floats:
@@ -161,7 +160,8 @@ class Georeference:
 class Plan:
     """A building; a notebook shows it as a picture.
 
-    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown.
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown. `picture`: of the one that the
+    plan is drawn over, metres a pixel and the place of its lower left corner.
     """
 
     name: str
@@ -171,6 +171,7 @@ class Plan:
     connectors: tuple[Connector, ...] = ()
     georeference: Georeference | None = None
     uncertainty_m: float | None = None
+    picture: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -261,6 +262,7 @@ def _plan(tree: Any, digest: str) -> Plan:
         connectors=tuple(_connector(row, f"connectors[{i}]", names) for i, row in enumerate(fields.connectors)),
         georeference=None if geo is None else Georeference(*geo.origin, math.radians(geo.rotation_deg), geo.crs),
         uncertainty_m=fields.uncertainty_m,
+        picture=fields.picture,
     )
 
 
@@ -285,8 +287,7 @@ def _room(fields: RoomFields, where: str) -> Room:
 
 
 def _door(fields: DoorFields, where: str) -> Door:
-    if fields.line[:2] == fields.line[2:]:
-        raise ValueError(f"{where}.line: {WITHOUT_LENGTH}")
+    _segments([fields.line], f"{where}.line")
     return Door(fields.line, fields.state, fields.name)
 
 
@@ -315,8 +316,6 @@ def _level_index(reference: str | int, where: str, names: list[str]) -> int:
 
 def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
     """An outline of at least three corners -> (n, 2) float64; consecutive equal corners count as one."""
-    if len(points) > plan_file.MOST_CORNERS:
-        raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
     corners = [corner for corner, _ in groupby(points)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
@@ -330,5 +329,5 @@ def _segments(rows: Sequence[tuple[float, float, float, float]], where: str) -> 
     segments = np.array(rows, dtype=np.float64).reshape(-1, 4)
     without_length = (segments[:, :2] == segments[:, 2:]).all(axis=1)
     if without_length.any():
-        raise ValueError(f"{where}[{without_length.argmax()}]: {WITHOUT_LENGTH}")
+        raise ValueError(f"{where}[{without_length.argmax()}]: a wall without length: both ends are the same point")
     return segments
