@@ -23,7 +23,7 @@ Sources = list[tuple[float, float, float]]
 def plans(draw: st.DrawFn) -> tuple[Floats, np.random.Generator]:
     """Walls at random, on a grid (so that they join, overlap and run through each other), square to it, or nearly so."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    count, style = draw(st.integers(1, 30)), draw(st.sampled_from(["free", "grid", "square", "sloppy"]))
+    count, style = draw(st.integers(0, 30)), draw(st.sampled_from(["free", "grid", "square", "sloppy"]))
     start, way = rng.uniform(0, 8, (count, 2)), rng.uniform(-3, 3, (count, 2))
     if style != "free":
         start, way = np.round(start), np.round(way)
@@ -108,12 +108,6 @@ def test_walls_without_length_change_nothing() -> None:
     walls = Walls(np.vstack([CORNER_OF_TWO, points]))
     assert heard(1.0, 1.0, -math.pi / 2, walls) == heard(1.0, 1.0, -math.pi / 2, Walls(CORNER_OF_TWO)) != []
     assert not crosses_wall(1.0, 0.2, 1.0, 0.8, walls.index)
-
-
-def test_no_walls() -> None:
-    index = Walls(np.zeros((0, 4))).near(np.zeros(1), np.zeros(1))
-    assert heard(0.0, 0.0, 0.0, index) == []
-    assert not crosses_wall(0.0, 0.0, 5.0, 5.0, index)
 
 
 def test_tables_of_many_tiles_stay_right() -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import inline_kernel, inline_part, kernel, lean_kernel, lean_part, part
+from echostep.jit import inline_kernel, inline_part, kernel, lean_kernel, part
 from echostep.walls.index import (
     BEARINGS,
     CONE_RAD,
@@ -187,16 +187,20 @@ def echo_sources(
     place where a wall ends or walls turn. Raises LookupError where `Walls.near` has not been.
     """
     receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
-    sources = SourceList(distance_m, off_axis_rad, kind)
-    u = _unit_of(px, py, axis_rad, index)
-    return 0 if u < 0 else _sources_of_unit(receiver, index.walls, index.faces, index.points, u, EVERYTHING, sources)
+    return first_sources(receiver, axis_rad, index, EVERYTHING, SourceList(distance_m, off_axis_rad, kind))
 
 
 @inline_kernel
 def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
     """`echo_sources` of a receiver with this bearing of its axis, without the sources that `limits` leaves out: for loops over many receivers."""
     u = _unit_of(receiver.x, receiver.y, axis_rad, index)
-    return 0 if u < 0 else _add_sources(receiver, index.walls, index.faces, index.points, u, limits, sources)
+    if u < 0:
+        return 0
+    n, reach_m = _add_faces(receiver, index.walls, index.faces, u, limits, sources)
+    n = _add_points(receiver, index.walls, index.points, u, n, reach_m, limits, sources)
+    for i in range(n):
+        sources.off_axis[i] = _angle(sources.off_axis[i])
+    return n
 
 
 @lean_kernel
@@ -219,26 +223,6 @@ def _unit_of(x: float, y: float, axis_rad: float, index: WallIndex) -> int:
     if not 0 <= k < index.tabulated:
         raise LookupError("the tile has no table: Walls.near makes it")
     return k * BEARINGS + bearing(axis_rad)
-
-
-@inline_part
-def _add_sources(
-    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
-) -> int:  # fmt: skip
-    """The sources of unit u."""
-    n, reach_m = _add_faces(receiver, walls, faces, u, limits, sources)
-    n = _add_points(receiver, walls, points, u, n, reach_m, limits, sources)
-    for i in range(n):
-        sources.off_axis[i] = _angle(sources.off_axis[i])
-    return n
-
-
-@lean_part
-def _sources_of_unit(
-    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
-) -> int:  # fmt: skip
-    """The same as a call: compiled once for all places where a call costs nothing."""
-    return _add_sources(receiver, walls, faces, points, u, limits, sources)
 
 
 @inline_part
