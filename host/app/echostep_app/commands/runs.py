@@ -7,7 +7,7 @@ In: the command's arguments and options. Out: files, views. Slow imports wait un
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -26,9 +26,6 @@ from echostep_app.commands.options import (
     page_address,
 )
 from echostep_simulation.kits import Kit
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer()
 
