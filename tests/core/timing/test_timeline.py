@@ -8,12 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from echostep.jit import kernel
 from echostep.ports.chunks import BOARD, LATEST_NS, MTX
+from echostep.timing import device_clock
 from echostep.timing import sync_edges as sync
-from echostep.timing.device_clock import new_clock, now_s, read
+from echostep.timing.device_clock import DeviceClock, new_clock, now_s
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, SILENT, MtxTiming, Timeline
 from naive import clocks as naive_clocks
 from timing.messages import MS, Message, times_of
+
+
+@kernel
+def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool) -> float:
+    return device_clock.read(clock, value, t_arrival_ns, restarted, True)
 
 
 class Clock:
@@ -23,7 +30,7 @@ class Clock:
         self.state = new_clock(unit_s, modulus)
 
     def at(self, value: int, t_arrival_ns: int, *, restarted: bool = False) -> float | None:
-        seconds = read(self.state, value, t_arrival_ns, restarted, True)
+        seconds = read(self.state, value, t_arrival_ns, restarted)
         return None if np.isnan(seconds) else seconds
 
 

@@ -24,7 +24,7 @@ from echostep.particles.kernels import (
     piece_of,
     propagate,
 )
-from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, first_sources
+from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, are_tabulated, first_sources
 from echostep.walls.index import WallIndex
 
 # Of the greatest, below which no likelihood is computed: the next resampling drops such particles
@@ -60,7 +60,7 @@ def propagate_and_reweight(
     particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
     model: CloudModel, walls: WallIndex, memory: EchoMemory,
 ) -> tuple[MoveProgress, float, float]:  # fmt: skip
-    """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (5, n) is for the rest of the move.
+    """Continue from `progress` until the cloud needs to be resampled or a table (`Walls.near`), or the move is over; `noise` (5, n) is for its rest.
 
     Writes to `memory.log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, the lowest
     log of the share that a piece of the move left of the greatest weight, and the log of the weight that the walls left.
@@ -78,6 +78,8 @@ def propagate_and_reweight(
             passed += math.log(max(left, wall_factor))
             done = until
         if k < len(pings.share):
+            if not are_tabulated(particles.x_m, particles.y_m, walls):
+                break
             memory.log_evidence[k], size, top = reweight_by_ping(
                 particles, arrays, memory.hidden[pings.ranger[k]], pings, k, model.echo, top, walls, sources
             )

@@ -63,7 +63,7 @@ def new_clock(unit_s: float, modulus: int) -> Any:
     return clock
 
 
-@kernel
+@part
 def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, leads: bool) -> float:
     """Device seconds of a counter value; NaN if it is dropped (a jump, counted).
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_part, inline_kernel, inline_part, kernel, lean_kernel, lean_part, part
+from echostep.jit import inline_kernel, inline_part, kernel, lean_kernel, part
 from echostep.walls.index import (
     BEARINGS,
     CONE_RAD,
@@ -184,50 +184,45 @@ def echo_sources(
     """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
 
     WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
-    place where a wall ends or walls turn.
+    place where a wall ends or walls turn. Raises LookupError where `Walls.near` has not been.
     """
     receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
-    sources = SourceList(distance_m, off_axis_rad, kind)
-    tile, u = tile_at(px, py, index), bearing(axis_rad)
-    if tile < 0 or not math.isfinite(axis_rad):
-        return 0
-    k = index.tile_number[tile] - 1
-    if 0 <= k < index.tabulated:
-        return _sources_of_unit(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, EVERYTHING, sources)
-    return _sources_of_missing_tile(receiver, tile, u, index, EVERYTHING, sources)
+    return first_sources(receiver, axis_rad, index, EVERYTHING, SourceList(distance_m, off_axis_rad, kind))
 
 
 @inline_kernel
 def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
     """`echo_sources` of a receiver with this bearing of its axis, without the sources that `limits` leaves out: for loops over many receivers."""
-    tile, u, n = tile_at(receiver.x, receiver.y, index), bearing(axis_rad), 0
-    if tile >= 0 and math.isfinite(axis_rad):
-        k = index.tile_number[tile] - 1
-        if 0 <= k < index.tabulated:
-            n = _add_sources(receiver, index.walls, index.faces, index.points, u + k * BEARINGS, limits, sources)
-        else:
-            n = _sources_of_missing_tile(receiver, tile, u, index, limits, sources)
-    return n
-
-
-@inline_part
-def _add_sources(
-    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
-) -> int:  # fmt: skip
-    """The sources of unit u."""
-    n, reach_m = _add_faces(receiver, walls, faces, u, limits, sources)
-    n = _add_points(receiver, walls, points, u, n, reach_m, limits, sources)
+    u = _unit_of(receiver.x, receiver.y, axis_rad, index)
+    if u < 0:
+        return 0
+    n, reach_m = _add_faces(receiver, index.walls, index.faces, u, limits, sources)
+    n = _add_points(receiver, index.walls, index.points, u, n, reach_m, limits, sources)
     for i in range(n):
         sources.off_axis[i] = _angle(sources.off_axis[i])
     return n
 
 
-@lean_part
-def _sources_of_unit(
-    receiver: Receiver, walls: Floats, faces: SourceTable, points: SourceTable, u: int, limits: Limits, sources: SourceList,
-) -> int:  # fmt: skip
-    """The same as a call: compiled once for all places where a call costs nothing."""
-    return _add_sources(receiver, walls, faces, points, u, limits, sources)
+@lean_kernel
+def are_tabulated(x: Floats, y: Floats, index: WallIndex) -> bool:
+    """Whether sources can be asked for at all of these places (n,)."""
+    for i in range(len(x)):
+        tile = tile_at(x[i], y[i], index)
+        if tile >= 0 and not 0 < index.tile_number[tile] <= index.tabulated:
+            return False
+    return True
+
+
+@inline_part
+def _unit_of(x: float, y: float, axis_rad: float, index: WallIndex) -> int:
+    """The unit of `SourceTable` for a pose; -1 where there are no sources. Raises LookupError for a tile without a table, which is never silence."""
+    tile = tile_at(x, y, index)
+    if tile < 0 or not math.isfinite(axis_rad):
+        return -1
+    k = index.tile_number[tile] - 1
+    if not 0 <= k < index.tabulated:
+        raise LookupError("the tile has no table: Walls.near makes it")
+    return k * BEARINGS + bearing(axis_rad)
 
 
 @inline_part
@@ -235,15 +230,6 @@ def bearing(axis_rad: float) -> int:
     """Which of the BEARINGS of `SourceTable` an axis has."""
     turns = axis_rad * (0.5 / math.pi)
     return min(int((turns - math.floor(turns)) * BEARINGS), BEARINGS - 1)
-
-
-@allocating_part
-def _sources_of_missing_tile(
-    receiver: Receiver, tile: int, u: int, index: WallIndex, limits: Limits, sources: SourceList
-) -> int:
-    """The sources in a tile that is not tabulated: its tables are made for this call alone."""
-    faces, points = tile_sources(tile, index, 0.0)
-    return _sources_of_unit(receiver, index.walls, faces, points, u, limits, sources)
 
 
 @inline_part

@@ -45,7 +45,7 @@ def inside_grid(x_m: Floats, y_m: Floats) -> Indoors:
     west_m, south_m = (float(v.min()) - (margin + 0.5) * CELL_M for v in (x_m, y_m))
     column, row = (np.rint((v - low) / CELL_M - 0.5).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))
     inside = np.zeros((int(row.max()) + margin + 1, int(column.max()) + margin + 1), np.bool_)
-    for down in range(-WALL_CELLS, WALL_CELLS + 1):
-        for along in range(-WALL_CELLS, WALL_CELLS + 1):
-            inside[row + down, column + along] = True
+    inside[row, column] = True
+    for axis in (0, 1):  # the margin holds what goes round
+        inside = np.logical_or.reduce([np.roll(inside, by, axis) for by in range(-WALL_CELLS, WALL_CELLS + 1)])
     return Indoors(west_m, south_m, inside)

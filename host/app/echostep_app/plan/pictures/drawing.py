@@ -37,17 +37,9 @@ LEVEL_WIDTH_PX = 900  # least width of a level
 GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
 BARE_DPI = 150  # of a picture without frame: lines are twice as wide in pixels as in points
 MANY = 20_000  # with more lines than this, pixels are drawn instead of lines
-# Of a finding's number
-BESIDE_RING_PT = (
-    (9.0, 9.0),
-    (9.0, -9.0),
-    (-9.0, 9.0),
-    (-9.0, -9.0),
-    (0.0, 14.0),
-    (0.0, -14.0),
-    (16.0, 0.0),
-    (-16.0, 0.0),
-)
+BESIDE_RING_PT = (  # of a finding's number
+    (9.0, 9.0), (9.0, -9.0), (-9.0, 9.0), (-9.0, -9.0), (0.0, 14.0), (0.0, -14.0), (16.0, 0.0), (-16.0, 0.0),
+)  # fmt: skip
 MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
@@ -119,14 +111,15 @@ def plan_figure(
     for number, i in enumerate(levels):
         drawn[i] = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(drawn[i], plan, i, view, [f for f in findings if f.level == i])
-        if layer is not None:
-            layer.draw(drawn[i], i)
-            figure.suptitle(shown(layer.title), size=10, parse_math=False)
+    if layer is not None:
+        figure.suptitle(shown(layer.title), size=10, parse_math=False)
     _draw_legend(figure, plan, levels, layer.legend if layer else ())
     layout.execute(figure)
     figure.set_layout_engine("none")
     for i, axes in drawn.items():
         axes.apply_aspect()
+        if layer is not None:
+            layer.draw(axes, i)
         _draw_names(axes, plan, i, view, [f for f in findings if f.level == i])
     return figure
 
@@ -327,4 +320,4 @@ def _mark(axes: Any, finding: PlanFinding) -> None:
     """A ring at the finding's position, and the lines that are wrong."""
     for x0, y0, x1, y1 in finding.lines_m:
         axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
-    axes.plot(*finding.position_m, "o", ms=11, mfc="none", mec=WRONG, mew=1.2, zorder=8)
+    axes.plot(*finding.position_m, "o", markersize=11, mfc="none", mec=WRONG, mew=1.2, zorder=8)
