@@ -51,12 +51,12 @@ def write_recording(path: Path, chunks: Iterable[Chunk], metadata: Mapping[str, 
     return path.read_bytes()
 
 
-def read_by_index(path: Path, *, reverse: bool = False) -> list[bytes]:
-    """Data of all messages, found by the index of chunks alone, as @mcap/core's indexed reader, Rerun and `mcap cat` find them."""
+def read_by_index(path: Path, chunks: int, *, reverse: bool) -> list[bytes]:
+    """Data of all messages in so many chunks, found by the index of chunks alone, as @mcap/core's indexed reader, Rerun and `mcap cat` find them."""
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
         assert summary is not None
-        assert summary.chunk_indexes
+        assert len(summary.chunk_indexes) == chunks
         return [message.data for _, _, message in make_reader(file).iter_messages(reverse=reverse)]
 
 

@@ -73,7 +73,7 @@ def test_a_run_is_read_by_its_index_of_chunks_alone(tmp_path: Path) -> None:
     chunks = [Chunk("board" if n % 3 else "mtx", n, bytes(n % 251)) for n in range(5000)]
     write(tmp_path / "a.mcap", chunks)
     for reverse in (False, True):
-        data = read_by_index(tmp_path / "a.mcap", reverse=reverse)
+        data = read_by_index(tmp_path / "a.mcap", 3, reverse=reverse)
         assert data == [chunk.data for chunk in chunks][:: -1 if reverse else 1]
 
 
