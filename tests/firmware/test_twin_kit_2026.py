@@ -80,6 +80,14 @@ JITTER_US = 2.0  # limit on the stamps and on the times of flight
 CLOCK_BEGINS_US = 1_163  # of the true time, after power-up
 
 
+def jitter_us(bench: Bench, side: str, answers: list[m.Ping]) -> float:
+    """Spread of the stamps of a ranger's pings about its triggers."""
+    truth_us = np.array([t for t, text in bench.board.trace if text == f"trigger {side}"]) * 1e-3
+    stamps_us = np.array([p.ticks for p in answers]) * 0.5
+    nearest_us = truth_us[np.abs(truth_us[:, None] - CLOCK_BEGINS_US - stamps_us).argmin(0)]
+    return float(np.ptp(stamps_us - nearest_us))
+
+
 @pytest.fixture
 def rangers(bench: Bench) -> Bench:
     """A board of the papers with pulse rangers on both sides, subscribed."""
@@ -100,11 +108,7 @@ def test_pulse_rangers_are_found_and_timed_to_two_microseconds(rangers: Bench) -
         answers = pings(found, ranger)
         assert len(answers) >= 145
         assert {p.outcome for p in answers} == {m.Outcome.ECHO}
-        truth_us = np.array([t for t, text in rangers.board.trace if text == f"trigger {side}"]) * 1e-3
-        stamps_us = np.array([p.ticks for p in answers]) * 0.5
-        nearest = truth_us[np.abs(truth_us[:, None] - CLOCK_BEGINS_US - stamps_us).argmin(0)]
-        errors = stamps_us - nearest
-        assert np.ptp(errors) <= JITTER_US
+        assert jitter_us(rangers, side, answers) <= JITTER_US
 
 
 def test_the_time_of_flight_of_a_pulse_is_right_to_two_microseconds(rangers: Bench) -> None:

@@ -9,13 +9,11 @@ import pytest
 from board_runs import Bench, kinds, needs_twin, pings, quiet_rows
 from echostep.board import messages as m
 from firmware.findings import findings_of
+from firmware.test_twin_kit_2026 import JITTER_US, SIDES, jitter_us
 
 pytestmark = needs_twin
 
-SIDES = (("left", m.Ranger.LEFT), ("right", m.Ranger.RIGHT))
 US_PER_CM = 58
-CLOCK_BEGINS_US = 1_163  # of the true time, after power-up
-JITTER_US = 2.0  # limit on the stamps
 
 
 def plug(bench: Bench, part: str, *sides: str) -> None:
@@ -43,10 +41,7 @@ def test_maxsonars_are_found_and_ping_ten_times_a_second_each(rangers: Bench) ->
         answers = pings(found, ranger)
         assert 99 <= len(answers) <= 101
         assert {p.outcome for p in answers} == {m.Outcome.ECHO}
-        truth_us = np.array([t for t, text in rangers.board.trace if text == f"trigger {side}"]) * 1e-3
-        stamps_us = np.array([p.ticks for p in answers]) * 0.5
-        errors = stamps_us - truth_us[np.abs(truth_us[:, None] - CLOCK_BEGINS_US - stamps_us).argmin(0)]
-        assert np.ptp(errors) <= JITTER_US
+        assert jitter_us(rangers, side, answers) <= JITTER_US
     assert not rangers.status.errors_ranger_left
     assert kinds(found)["Gyros"] >= 1_999
 

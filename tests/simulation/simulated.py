@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
 from echostep.xsens import MtSample, MtxReader
@@ -30,10 +28,6 @@ FAULTLESS = MtxModel(
 def samples_of(frames: list[bytes]) -> list[MtSample]:
     """Each by a reader of its own: without noise samples repeat, which one reader does not believe."""
     return [sample for frame in frames for sample in MtxReader().feed(frame)]
-
-
-def vars_of(model: MtxModel) -> dict[str, Any]:
-    return {name: getattr(model, name) for name in MtxModel.__dataclass_fields__}
 
 
 def heard(sent: list[tuple[int, bytes]], reader: BoardReader | None = None) -> list[m.Message]:

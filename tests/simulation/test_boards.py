@@ -6,6 +6,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections import Counter
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,15 @@ def rows_of(n: int, own_us: tuple[int, int] = (5_831, 7_000), cross_us: tuple[in
     return rows
 
 
+def pings_of(rows: NDArray[Any], schedule: m.Schedule | None = None) -> list[m.Ping]:
+    """Of the Python board; with a schedule those after the first half second."""
+    board, reader = PythonBoard(seed=1), BoardReader()
+    if schedule is not None:
+        board.send(encode(m.Configure(0xFF, schedule, 100, 5, 0), 0))
+        heard(board.advance(rows_of(500)), reader)
+    return [x for x in heard(board.advance(rows), reader) if isinstance(x, m.Ping)]
+
+
 def test_the_python_board_sends_every_stream_at_its_rate() -> None:
     found = heard(PythonBoard(seed=1).advance(rows_of(10_000)))
     count = Counter(type(x).__name__ for x in found)
@@ -55,7 +65,7 @@ def test_the_python_board_sends_every_stream_at_its_rate() -> None:
 
 
 def test_concurrent_pings_are_jittered_and_a_cycle_apart() -> None:
-    found = [x for x in heard(PythonBoard(seed=1).advance(rows_of(10_000))) if isinstance(x, m.Ping)]
+    found = pings_of(rows_of(10_000))
     for ranger in m.Ranger:
         gaps = np.diff([x.ticks for x in found if x.ranger == ranger]) / 2_000
         assert gaps.min() >= 60.0
@@ -106,20 +116,14 @@ def test_no_echo_is_looked_at_in_other_milliseconds_than_those_announced(schedul
 
 
 def test_simultaneous_pings_are_fired_in_pairs() -> None:
-    board, reader = PythonBoard(seed=1), BoardReader()
-    board.send(encode(m.Configure(0xFF, m.Schedule.SIMULTANEOUS, 100, 5, 0), 0))
-    heard(board.advance(rows_of(500)), reader)
-    found = [x for x in heard(board.advance(rows_of(3_000)), reader) if isinstance(x, m.Ping)]
+    found = pings_of(rows_of(3_000), m.Schedule.SIMULTANEOUS)
     fired = [[x.ticks for x in found if x.ranger == ranger] for ranger in m.Ranger]
     assert 44 <= len(fired[0]) <= 46
     assert fired[0] == fired[1]
 
 
 def test_sequential_pings_take_turns_every_seventy_milliseconds() -> None:
-    board, reader = PythonBoard(seed=1), BoardReader()
-    board.send(encode(m.Configure(0xFF, m.Schedule.SEQUENTIAL, 100, 5, 0), 0))
-    heard(board.advance(rows_of(500)), reader)
-    found = [x for x in heard(board.advance(rows_of(3_000)), reader) if isinstance(x, m.Ping)]
+    found = pings_of(rows_of(3_000), m.Schedule.SEQUENTIAL)
     assert 40 <= len(found) <= 44
     assert all(a.ranger != b.ranger for a, b in itertools.pairwise(found))
     assert all(abs(b.ticks - a.ticks - 140_000) < 8_000 for a, b in itertools.pairwise(found))
@@ -127,14 +131,9 @@ def test_sequential_pings_take_turns_every_seventy_milliseconds() -> None:
 
 def test_the_other_rangers_echo_counts_when_it_comes_first() -> None:
     """It moves with the jitter between the triggers; the own echo does not [host/docs/design/bench.md]."""
-    none = {x.outcome for x in heard(PythonBoard(seed=1).advance(rows_of(2_000, (0, 0)))) if isinstance(x, m.Ping)}
-    assert none == {m.Outcome.NO_ECHO}
+    assert {x.outcome for x in pings_of(rows_of(2_000, (0, 0)))} == {m.Outcome.NO_ECHO}
     late_us = 30_000  # of the left ranger's ping at the right one, and the other way round
-    found = [
-        x
-        for x in heard(PythonBoard(seed=1).advance(rows_of(10_000, (0, 0), (40_000, 40_000))))
-        if isinstance(x, m.Ping)
-    ]
+    found = pings_of(rows_of(10_000, (0, 0), (40_000, 40_000)))
     triggers = {r: np.array([x.ticks for x in found if x.ranger == r]) / 2 for r in m.Ranger}
     crossed = [x for x in found if x.outcome == m.Outcome.ECHO]
     assert crossed
@@ -142,11 +141,7 @@ def test_the_other_rangers_echo_counts_when_it_comes_first() -> None:
         came_us = ping.ticks / 2 + ping.time_of_flight_us
         assert np.abs(triggers[m.Ranger(1 - ping.ranger)] + 40_000 - came_us).min() <= 1
     assert np.std([x.time_of_flight_us for x in crossed]) > 500
-    own = [
-        x
-        for x in heard(PythonBoard(seed=1).advance(rows_of(5_000, (900, 900), (late_us, late_us))))
-        if isinstance(x, m.Ping)
-    ]
+    own = pings_of(rows_of(5_000, (900, 900), (late_us, late_us)))
     assert {x.time_of_flight_us for x in own} == {900}
 
 
@@ -188,14 +183,11 @@ while True:
 
 @pytest.mark.process
 def test_a_board_process_advances_in_lockstep() -> None:
-    board = BoardProcess([sys.executable, "-c", ECHO_BOARD])
-    try:
+    with closing(BoardProcess([sys.executable, "-c", ECHO_BOARD])) as board:
         board.send(b"from the host")
         assert board.advance(rows_of(50)) == [(50_000_000, b"hello")]
         assert board.advance(rows_of(10)) == [(60_000_000, b"hello")]
         assert board.trace == [(50_000_000, "trigger left"), (60_000_000, "trigger left")]
-    finally:
-        board.close()
 
 
 @pytest.mark.process
@@ -208,23 +200,16 @@ def test_a_board_process_advances_in_lockstep() -> None:
     ],
 )
 def test_a_board_that_fails_is_named(program: str) -> None:
-    board = BoardProcess([sys.executable, "-c", program])
-    try:
-        with pytest.raises(EchostepError, match="python"):
-            board.advance(rows_of(10))
-    finally:
-        board.close()
+    with closing(BoardProcess([sys.executable, "-c", program])) as board, pytest.raises(EchostepError, match="python"):
+        board.advance(rows_of(10))
 
 
 @pytest.mark.process
 def test_a_board_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("echostep_simulation.devices.board.TIMEOUT_S", 0.5)
-    board = BoardProcess([sys.executable, "-c", "import sys; sys.stdin.buffer.read()"])
-    try:
-        with pytest.raises(EchostepError, match="did not answer"):
-            board.advance(rows_of(10))
-    finally:
-        board.close()
+    mute = [sys.executable, "-c", "import sys; sys.stdin.buffer.read()"]
+    with closing(BoardProcess(mute)) as board, pytest.raises(EchostepError, match="did not answer"):
+        board.advance(rows_of(10))
 
 
 @pytest.mark.process

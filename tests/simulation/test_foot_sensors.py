@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep_simulation.devices.mtx import GRAVITY_M_S2, MtxModel, specific_force_and_rate, stream
+from echostep_simulation.devices.mtx import GRAVITY_M_S2, specific_force_and_rate, stream
 from echostep_simulation.people.attitude import quaternions, rotations
 from echostep_simulation.people.walker import RATE_HZ, Walk
-from simulation.simulated import FAULTLESS, samples_of, vars_of
+from simulation.simulated import FAULTLESS, samples_of
 
 
 def strapdown(force: Floats, rate: Floats, r0: Floats, dt_s: float) -> Floats:
@@ -57,7 +58,7 @@ def test_a_standing_foot_feels_gravity_and_nothing_else(l_walk: Walk) -> None:
 
 @pytest.mark.parametrize("rate_hz", [100.0, 200.0])
 def test_samples_are_means_over_their_interval(l_walk: Walk, rate_hz: float) -> None:
-    found = stream(l_walk, MtxModel(**{**vars_of(FAULTLESS), "rate_hz": rate_hz}), np.random.default_rng(1))
+    found = stream(l_walk, replace(FAULTLESS, rate_hz=rate_hz), np.random.default_rng(1))
     force, rate = specific_force_and_rate(l_walk)
     samples = samples_of(found.frames)
     n = int(RATE_HZ / rate_hz)

@@ -18,7 +18,7 @@ from echostep_simulation.devices.serial_delivery import deliver
 from echostep_simulation.people.attitude import rotations
 from echostep_simulation.people.walker import RATE_HZ, Person, Walk
 from echostep_simulation.world.magnetic_field import EARTH, MagneticField
-from simulation.simulated import FAULTLESS, samples_of, vars_of
+from simulation.simulated import FAULTLESS, samples_of
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_the_mtx_world_is_north_west_up(l_walk: Walk) -> None:
 
 
 def test_a_mounting_turns_what_is_felt(l_walk: Walk) -> None:
-    upside_down = MtxModel(**{**vars_of(FAULTLESS), "mounting_rpy_rad": (math.pi, 0.0, 0.0)})
+    upside_down = replace(FAULTLESS, mounting_rpy_rad=(math.pi, 0.0, 0.0))
     sample = samples_of(stream(l_walk, upside_down, np.random.default_rng(1)).frames)[10]
     assert sample.accel[2] == pytest.approx(-GRAVITY_M_S2, abs=1e-3)
     with_z_down = 1.0 - 2.0 * (sample.quaternion[1] ** 2 + sample.quaternion[2] ** 2)

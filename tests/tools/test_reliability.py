@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -25,13 +26,10 @@ from twin.live_walk import HostFault, LiveWalk
 @needs_twin
 def test_every_fault_of_the_matrix_exists() -> None:
     bench = Bench()
-    try:
+    with closing(bench.board):
         for fault in faults.FAULTS:
-            for switch in (*fault.switches, *fault.end):
-                bench.fault(switch)
+            bench.fault(*fault.switches, *fault.end)
         bench.run(1)
-    finally:
-        bench.board.close()
 
 
 def test_gaps_are_judged() -> None:

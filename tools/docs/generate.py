@@ -17,16 +17,9 @@ from echostep_app.team.messages.report import schema
 
 def pages() -> dict[Path, str]:
     """The text of each file by its path."""
-    made = {
-        "commands": commands,
-        "settings": settings,
-        "recordings": recordings,
-        "plan": plan,
-        "teams": teams,
-        "python": python,
-    }
-    texts = {DOCS / f"{name}.md": module.page() for name, module in made.items()} | {teams.SCHEMA: schema()}
-    return texts | {hardware.README: hardware.page()}
+    made = (commands, settings, recordings, plan, teams, python)
+    texts = {DOCS / f"{module.__name__.rpartition('.')[2]}.md": module.page() for module in made}
+    return texts | {teams.SCHEMA: schema(), hardware.README: hardware.page()}
 
 
 def main() -> int:

@@ -24,6 +24,7 @@ FILE = ROOT / "host/tested-versions.txt"
 OLDEST = "3.11.2"  # Debian 12's
 # Pyproj: longitude and latitude of the demo; hatchling installs the checkout
 DEMO = ("./host/core", "./host/app[page,plots]", "pyproj", "hatchling")
+OWN = ("echostep", "echostep-app", "echostep-studies")
 ALL = ("./host/core", "./host/app[dev]", "./host/studies[cluster]", "hatchling")
 HEAD = (
     "# Versions with which the tests have passed, and the hashes of their files, for every system and Python: "
@@ -43,14 +44,7 @@ def resolved(wanted: tuple[str, ...], preferred: str, uv: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         lines = Path(folder, "versions.txt")
         lines.write_text(preferred)
-        own = (
-            "--no-emit-package",
-            "echostep",
-            "--no-emit-package",
-            "echostep-app",
-            "--no-emit-package",
-            "echostep-studies",
-        )
+        own = [word for name in OWN for word in ("--no-emit-package", name)]
         layout = ("--quiet", "--no-header", "--no-annotate", "--generate-hashes", "--output-file", str(lines))
         command = [uv, "pip", "compile", "--universal", "--python-version", OLDEST, *own, *layout, "-"]
         subprocess.run(command, input="\n".join(wanted), cwd=ROOT, stdout=subprocess.DEVNULL, text=True, check=True)

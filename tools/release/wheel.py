@@ -20,23 +20,13 @@ from pathlib import Path
 
 from places import ROOT
 
+PIP = [sys.executable, "-m", "pip"]
+
 
 def build(folder: Path, ring: str) -> Path:
     """Build the wheel of `core` or `app` in a folder; raises subprocess.CalledProcessError with the output of pip."""
-    run(
-        [
-            sys.executable,
-            "-m",
-            "pip",
-            "wheel",
-            "--quiet",
-            "--no-deps",
-            "--no-build-isolation",
-            "-w",
-            folder,
-            ROOT / "host" / ring,
-        ]
-    )
+    options = ["--quiet", "--no-deps", "--no-build-isolation"]
+    run([*PIP, "wheel", *options, "-w", folder, ROOT / "host" / ring])
     (wheel,) = folder.glob("echostep-*.whl" if ring == "core" else "echostep_app-*.whl")
     return wheel
 
@@ -51,7 +41,7 @@ def environment(folder: Path, wheels: list[Path], *, borrow: bool) -> Path:
     if borrow:
         _link_packages(folder)
     offline = ["--no-deps", "--no-index"] if borrow else ["--only-binary", ":all:"]
-    run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", *offline, *wheels])
+    run([*PIP, "--python", python, "install", "--quiet", *offline, *wheels])
     return folder / "bin"
 
 

@@ -21,8 +21,9 @@ from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 from echostep_simulation.devices.board import Board
 from echostep_simulation.devices.mtx import MtxModel
+from echostep_simulation.devices.serial_delivery import usb_chunks
 from echostep_simulation.people.walker import Person, Waypoint
-from echostep_simulation.scenario import BLOCK_MS, START_NS, USB_LATENCY_NS, Scenario
+from echostep_simulation.scenario import BLOCK_MS, START_NS, Scenario
 
 MODEL = MtxModel(drift_ppm=50.0)
 SAMPLES, SPAN_MS = 2000, 20_001  # samples of MODEL's crystal that take a whole number of milliseconds
@@ -61,14 +62,13 @@ class EndlessWalk:
         return heapq.merge(self._board_chunks(), self.mtx_chunks(), key=attrgetter("t_arrival_ns"))
 
     def _board_chunks(self) -> Iterator[Chunk]:
-        """The board's bytes as a USB host gets them, those of one instant together; the last block of a round may be shorter."""
+        """The board's bytes; the last block of a round may be shorter."""
         for begin_ms in count(0, self.length_ms):
             for start in range(0, self.length_ms, BLOCK_MS):
-                rows, gathered = self.rows[start : start + BLOCK_MS], dict[int, bytes]()
-                for t_ns, part in self.board.advance(rows):
-                    gathered[t_ns] = gathered.get(t_ns, b"") + part
+                rows = self.rows[start : start + BLOCK_MS]
+                sent = self.board.advance(rows)
                 self.t_s = 1e-3 * (begin_ms + start + len(rows))
-                yield from (Chunk(BOARD, START_NS + t_ns + USB_LATENCY_NS, part) for t_ns, part in gathered.items())
+                yield from usb_chunks(BOARD, sent, START_NS)
 
     def mtx_chunks(self) -> Iterator[Chunk]:
         """The MTx's frames, their counter going on from round to round."""

@@ -25,13 +25,13 @@ from echostep_simulation.devices.board_sensors import WornGyro
 from echostep_simulation.devices.foot_board import FootBoardPort, foot_rng
 from echostep_simulation.devices.kit_2026 import Kit2026Sensors
 from echostep_simulation.devices.mtx import MtxModel, stream
+from echostep_simulation.devices.serial_delivery import usb_chunks
 from echostep_simulation.kits import Kit
 from echostep_simulation.people.walker import Person, Walk, Waypoint, walk
 from echostep_simulation.stimulus import TEMPERATURE_C, BoardSensors
 from echostep_simulation.world.magnetic_field import MagneticField
 
 BLOCK_MS = 50
-USB_LATENCY_NS = 1_000_000
 START_NS = 1_000_000_000  # the host's clock when the board is switched on
 TRUTH_MS = 20
 DEMO_WAYPOINTS: tuple[Waypoint, ...] = (
@@ -110,13 +110,9 @@ class Scenario:
             self.foot.board.close()
 
     def _board_chunks(self, start: int, stop: int) -> list[Chunk]:
-        """The board's bytes of these milliseconds as a USB host gets them, bytes of one instant together."""
-        gathered: dict[int, bytes] = {}
+        """The board's bytes of these milliseconds."""
         ranging = self._board.may_range(stop - start) if isinstance(self._board, PythonBoard) else None
-        for t_ns, part in self._board.advance(self.sensors.rows(start, stop, ranging)):
-            arrival = START_NS + t_ns + USB_LATENCY_NS
-            gathered[arrival] = gathered.get(arrival, b"") + part
-        return [Chunk(BOARD, t_ns, part) for t_ns, part in gathered.items()]
+        return usb_chunks(BOARD, self._board.advance(self.sensors.rows(start, stop, ranging)), START_NS)
 
     def _mtx_chunks(self) -> Iterator[Chunk]:
         arrivals = START_NS + np.rint(self.mtx.portion_s * 1e9).astype(np.int64)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -207,15 +209,13 @@ def test_older_firmware_is_not_asked_and_the_doctor_says_what_to_do() -> None:
 @needs_twin
 def test_a_host_that_follows_the_rule_keeps_its_subscription_over_a_crash() -> None:
     bench, subscription = Bench(), BoardSubscription()
-    try:
+    with closing(bench.board):
         for ms in range(0, 5_000, 50):
             if ms == 2_000:
                 bench.fault("reset=watchdog")
             for message in bench.run(50):
                 if subscription.is_due(message):
                     bench.board.send(encode(SUBSCRIBE, 0))
-    finally:
-        bench.board.close()
     health = [x for x in bench.messages if isinstance(x, m.BoardHealth)]
     assert [x.crashes for x in health][:1] == [0]
     assert health[-1].crashes == 1

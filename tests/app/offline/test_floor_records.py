@@ -17,8 +17,8 @@ from echostep_app.offline.floors.floor_table import describe, find_levels, visit
 from echostep_app.offline.floors.floors import record_floors
 from echostep_app.offline.floors.pressure_csv import Pressures, load_pressures
 from echostep_app.offline.floors.stays import coarse_m, height_record, heights_by_pressure, noise_m
+from offline.test_floors import STOREYS, heights_of, write
 
-STOREYS = np.array([0.0, 3.5, 7.0])
 METRE_PA = 11.7
 
 
@@ -55,12 +55,6 @@ def right(samples: Pressures, heights_m: Floats, storeys_m: Floats, start: int |
 
 def levels(samples: Pressures) -> Floats:
     return find_levels(height_record(samples), "a.csv")
-
-
-def heights(samples: Pressures) -> Floats:
-    """Above the start, at the samples."""
-    record = height_record(samples)
-    return record.height_m[record.segment]
 
 
 @pytest.mark.parametrize(("step_pa", "rate_hz"), [(4.0, 5.0), (10.0, 1.0), (10.0, 25.0)])
@@ -100,13 +94,13 @@ def test_a_silence_moves_nobody() -> None:
     way = np.full(5 * 900, 3.5)
     samples, kept = silent(record(way, 5.0), way, 100.0, 700.0)
     assert right(samples, kept, STOREYS, 1) == 1.0
-    assert abs(heights(samples)[-1]) < 2.0
+    assert abs(heights_of(samples)[-1]) < 2.0
 
 
 def test_without_storeys_a_rise_in_a_silence_is_seen() -> None:
     way = walk(UP_AND_DOWN, 5.0)
     samples, _ = silent(record(way, 5.0), way, 45.0, 100.0)
-    assert heights(samples)[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
+    assert heights_of(samples)[np.searchsorted(samples.t_s, 110.0)] == pytest.approx(7.0, abs=0.7)
 
 
 @pytest.mark.slow
@@ -161,12 +155,10 @@ def test_a_storey_that_vanishes_is_told() -> None:
 def test_rows_with_the_time_of_the_row_before_are_skipped(tmp_path: Path) -> None:
     """Loggers write the last pressure again when there is no new one."""
     samples = record(walk(UP_AND_DOWN, 5.0), 5.0)
-    lines = [f"{t:.3f},{p:.2f}\n" for t, p in zip(samples.t_s.tolist(), samples.pressure_pa.tolist(), strict=True)]
-    source = tmp_path / "twice.csv"
-    source.write_text("t_s,pressure_pa\n" + "".join(line for line in lines for _ in range(3)))
-    found = load_pressures(source)
-    assert len(found.samples.t_s) == len(lines)
-    assert f"{2 * len(lines)} rows with the t_s of the row before" in found.notes[0]
+    thrice = Pressures(samples.t_s.repeat(3), samples.pressure_pa.repeat(3))
+    found = load_pressures(write(tmp_path / "thrice.csv", thrice))
+    assert len(found.samples.t_s) == len(samples.t_s)
+    assert f"{2 * len(samples.t_s)} rows with the t_s of the row before" in found.notes[0]
 
 
 BRIEF_VISIT = [
@@ -209,23 +201,21 @@ def test_a_wrong_first_sample_makes_no_rise_and_hides_none(first_pa: float | Non
     pressure_pa = CLIMB_PA.copy()
     if first_pa:
         pressure_pa[0] = first_pa
-    height_m = heights(Pressures(T_S, pressure_pa))
+    height_m = heights_of(Pressures(T_S, pressure_pa))
     assert height_m[1400] - height_m[500] == pytest.approx(3.5, abs=0.3)
     assert height_m[-1] == pytest.approx(3.5, abs=0.3)
 
 
 def test_a_lift_from_the_first_sample_on_is_a_rise() -> None:
     pressure_pa = 101_325.0 * np.exp(-np.minimum(5.0 * T_S, 60.0) / 8434)
-    assert heights(Pressures(T_S, pressure_pa))[-1] == pytest.approx(60.0, abs=2.0)
+    assert heights_of(Pressures(T_S, pressure_pa))[-1] == pytest.approx(60.0, abs=2.0)
 
 
 @pytest.mark.parametrize(("wrong", "pa"), [(0, 0.0), (1, 68_500.0), (5, 118_000.0)])
 def test_a_file_says_how_many_first_readings_were_left_out(tmp_path: Path, wrong: int, pa: float) -> None:
     pressure_pa = CLIMB_PA.copy()
     pressure_pa[:wrong] = pa
-    rows = "\n".join(f"{t:.2f},{p:.2f}" for t, p in zip(T_S.tolist(), pressure_pa.tolist(), strict=True))
-    (tmp_path / "p.csv").write_text(f"t_s,pressure_pa\n{rows}\n")
-    record = load_pressures(tmp_path / "p.csv")
+    record = load_pressures(write(tmp_path / "p.csv", Pressures(T_S, pressure_pa)))
     assert len(record.samples.t_s) == len(T_S) - wrong
     expected = f"{wrong} rows before the barometer had settled, as its reset value: skipped (first: line 2)"
     assert record.notes == ((expected,) if wrong else ())
@@ -235,6 +225,4 @@ def test_a_spike_or_a_slammed_door_in_the_middle_leaves_nothing_out(tmp_path: Pa
     pressure_pa = CLIMB_PA.copy()
     pressure_pa[300] = 99_000.0
     pressure_pa[500:503] -= 60.0
-    rows = "\n".join(f"{t:.2f},{p:.2f}" for t, p in zip(T_S.tolist(), pressure_pa.tolist(), strict=True))
-    (tmp_path / "p.csv").write_text(f"t_s,pressure_pa\n{rows}\n")
-    assert load_pressures(tmp_path / "p.csv").notes == ()
+    assert load_pressures(write(tmp_path / "p.csv", Pressures(T_S, pressure_pa))).notes == ()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import socket
+from contextlib import closing
 
 import pytest
 
@@ -21,23 +22,21 @@ GOOD = message(7, 3.25, 0.5, 10.0)
 
 def test_udp_flood_and_malformed_datagrams_reach_the_reader_and_stop_nothing() -> None:
     url = f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
-    ports = SerialPorts({GATEWAY: url}, {GATEWAY: 115200})
-    gateway, words = Gateway(), 0
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plug:
-            address = ("127.0.0.1", int(url.rsplit(":", 1)[1]))
-            for k, chunk in zip(range(100_000), ports.chunks(), strict=False):
-                words += len(gateway.read(chunk.data, 10.0)) if chunk else 0
-                if gateway.counts.flood <= 100 or gateway.counts.broken <= 100:
-                    for n in range(20):
-                        plug.sendto(encode(GOOD, 20 * k + n), address)
-                        plug.sendto(b"\x07garbage" * (n % 9), address)
-                elif words < 2:
-                    plug.sendto(encode(message(9, 1.0, 0.0, 10.0), 0), address)
-                else:
-                    break
-    finally:
-        ports.close()
+    gateway, words, address = Gateway(), 0, ("127.0.0.1", int(url.rsplit(":", 1)[1]))
+    with (
+        closing(SerialPorts({GATEWAY: url}, {GATEWAY: 115200})) as ports,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plug,
+    ):
+        for k, chunk in zip(range(100_000), ports.chunks(), strict=False):
+            words += len(gateway.read(chunk.data, 10.0)) if chunk else 0
+            if gateway.counts.flood <= 100 or gateway.counts.broken <= 100:
+                for n in range(20):
+                    plug.sendto(encode(GOOD, 20 * k + n), address)
+                    plug.sendto(b"\x07garbage" * (n % 9), address)
+            elif words < 2:
+                plug.sendto(encode(message(9, 1.0, 0.0, 10.0), 0), address)
+            else:
+                break
     assert words == 2
     assert gateway.counts.flood > 100
     assert gateway.counts.broken > 100

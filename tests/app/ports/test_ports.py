@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import signal
 import socket
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -41,8 +42,7 @@ def test_a_number_that_two_devices_share_tells_nothing(monkeypatch: pytest.Monke
 def test_a_device_under_a_new_name_is_found_by_its_number(monkeypatch: pytest.MonkeyPatch) -> None:
     with pseudo_terminal() as (board, was), pseudo_terminal() as (again, now), pseudo_terminal() as (stranger, other):
         plugged(monkeypatch, **{was.replace("/", "_"): "7"})
-        ports = SerialPorts({"board": was}, {"board": 115200})
-        try:
+        with closing(SerialPorts({"board": was}, {"board": 115200})) as ports:
             plugged(monkeypatch, **{other.replace("/", "_"): "9"})  # another device, first
             ports._ports["board"].close()
             assert until(lambda: any("went away" in notice for notice in ports.notices))
@@ -53,16 +53,14 @@ def test_a_device_under_a_new_name_is_found_by_its_number(monkeypatch: pytest.Mo
             assert next(chunks).data == b""  # the sign that the port was opened again
             assert next(chunks).data == b"hello"
             assert ports.urls == {"board": now}
-        finally:
-            ports.close()
     del board, stranger
 
 
 def test_bytes_over_tcp_come_in_blocks_and_a_closed_connection_is_made_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(PATIENCE_S)
-        ports = SerialPorts({"board": f"socket://127.0.0.1:{server.getsockname()[1]}"}, {"board": 115200})
-        try:
+        url = f"socket://127.0.0.1:{server.getsockname()[1]}"
+        with closing(SerialPorts({"board": url}, {"board": 115200})) as ports:
             bridge, _ = server.accept()
             sent = bytes(range(256)) * 40
             bridge.sendall(sent)
@@ -78,8 +76,6 @@ def test_bytes_over_tcp_come_in_blocks_and_a_closed_connection_is_made_again() -
             with server.accept()[0] as bridge:
                 bridge.sendall(b"again")
             assert until(lambda: any(chunk.data == b"again" for chunk in [next(chunks)]))
-        finally:
-            ports.close()
 
 
 @pytest.mark.parametrize("url", ["socket://127.0.0.1:1", "socket://127.0.0.1", "socket://127.0.0.1:99999"])

@@ -22,18 +22,18 @@ from echostep_app.printing.console import console_for_people
 from echostep_app.printing.lines import complain, say, shown
 from echostep_app.printing.stream import QUEUE_BYTES, PeopleStream
 from echostep_app.recording.recorder import Recorder
+from recording.damages import record_walk
 from waiting import ends, until
 from walks import DEMO as PLAN
-from walks import walk_chunks
 
 FULL = Path("/dev/full")  # refuses every byte: no space left [full(4)]
 
 
 @contextlib.contextmanager
-def pipe() -> Iterator[tuple[int, TextIO]]:
+def pipe(encoding: str = "utf-8") -> Iterator[tuple[int, TextIO]]:
     """A pipe: our end to read, and its other end as a text stream."""
     ours, theirs = os.pipe()
-    with os.fdopen(theirs, "w", encoding="utf-8") as stream:
+    with os.fdopen(theirs, "w", encoding=encoding) as stream:
         yield ours, stream
     with contextlib.suppress(OSError):  # closed by the test
         os.close(ours)
@@ -108,13 +108,11 @@ def test_a_run_waits_for_no_reader_and_drops_what_is_too_much() -> None:
 
 
 def test_letters_that_a_terminal_lacks_are_replaced() -> None:
-    ours, theirs = os.pipe()
-    with os.fdopen(theirs, "w", encoding="ascii") as stream:
+    with pipe("ascii") as (ours, stream):
         printed = PeopleStream(stream, "standard output")
         printed.write("● here\n")
         printed.flush()
         assert os.read(ours, 100) == b"? here\n"
-    os.close(ours)
 
 
 def test_a_fault_is_told_on_the_other_stream_once_and_kept_for_page_and_recording(
@@ -186,9 +184,7 @@ def test_a_new_file_is_private_and_earlier_ones_keep_content_and_mode(tmp_path: 
 def test_every_file_of_a_replay_and_of_an_export_has_the_mode(tmp_path: Path, option: list[str], expected: int) -> None:
     walk, out = tmp_path / "walk.mcap", tmp_path / "out"
     share_files(wanted=bool(option))
-    with Recorder(walk, {"seed": "1"}) as recorder:
-        for chunk in walk_chunks(8.0):
-            recorder.write(chunk)
+    record_walk(walk, 8.0)
     assert mode(walk) == expected
     echostep(*option, "replay", walk, "--plan", PLAN, "--headless", "--out", out, ends=0)
     echostep(*option, "export", walk, "--plan", PLAN, "-o", out / "track.parquet", ends=0)

@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 import random
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mcap.reader import make_reader
 
 from echostep.localization import Estimate, TrackStatus
 from echostep.plan import load_plan
+from echostep.ports.chunks import Chunk
 from echostep.recording import MCAP_MAGIC, open_recording
 from echostep.recording.damage.scan import CHUNK, CHUNK_HEAD
 from echostep.recording.mcap_records import HEAD_SIZE, LOG_TIME_OFFSET, MESSAGE
@@ -41,12 +43,26 @@ class Replayed:
     said: Sequence[str]
 
 
-def record_walk(path: Path, seconds: float) -> bytes:
-    """The first seconds of the demo as a recording."""
-    with Recorder(path, {"seed": "1"}) as recorder:
-        for chunk in walk_chunks(seconds):
+def write_recording(path: Path, chunks: Iterable[Chunk], metadata: Mapping[str, str]) -> bytes:
+    """A recording of these chunks."""
+    with Recorder(path, metadata) as recorder:
+        for chunk in chunks:
             recorder.write(chunk)
     return path.read_bytes()
+
+
+def read_by_index(path: Path, chunks: int, *, reverse: bool) -> list[bytes]:
+    """Data of all messages in so many chunks, found by the index of chunks alone, as @mcap/core's indexed reader, Rerun and `mcap cat` find them."""
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        assert len(summary.chunk_indexes) == chunks
+        return [message.data for _, _, message in make_reader(file).iter_messages(reverse=reverse)]
+
+
+def record_walk(path: Path, seconds: float) -> bytes:
+    """The first seconds of the demo as a recording."""
+    return write_recording(path, walk_chunks(seconds), {"seed": "1"})
 
 
 def replay(path: Path) -> Replayed:

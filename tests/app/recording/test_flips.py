@@ -18,7 +18,6 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.recording import open_recording
 from echostep.recording.mcap_records import HEAD_SIZE
 from echostep.tracker import Tracker
-from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import repair
 from echostep_app.session.losses import skipped
@@ -31,6 +30,7 @@ from recording.damages import (
     flipped,
     record_walk,
     replay,
+    write_recording,
 )
 from walks import DEMO, walk_chunks
 
@@ -68,19 +68,12 @@ def test_one_flipped_bit_of_an_arrival_time_harms_no_estimate_and_is_counted(por
     assert tracker.streams.front_end.bad_arrivals >= 1
 
 
-def write(path: Path) -> bytes:
-    with Recorder(path, {"seed": "1"}) as recorder:
-        for chunk in CHUNKS:
-            recorder.write(chunk)
-    return path.read_bytes()
-
-
 def damage(path: Path, offset: int, bit: int) -> None:
     path.write_bytes(flipped(path.read_bytes(), offset, bit))
 
 
 def test_a_flipped_arrival_time_is_corrected_by_repair(tmp_path: Path) -> None:
-    times = arrival_offsets(write(tmp_path / "a.mcap"))
+    times = arrival_offsets(write_recording(tmp_path / "a.mcap", CHUNKS, {"seed": "1"}))
     damage(tmp_path / "a.mcap", times[100] + 5, 0)
     assert any("1 arrival times contradict" in line for line in info(tmp_path / "a.mcap"))
     repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
@@ -94,7 +87,7 @@ def test_a_wrong_length_costs_a_few_messages_not_all_behind_it(tmp_path: Path) -
     """Bit 13 of a length would swallow a hundred messages, an impossible opcode ended the reading."""
     for name, offset, bit in (("length", 1 + 1, 5), ("opcode", 0, 6)):
         path = tmp_path / f"{name}.mcap"
-        record = arrival_offsets(write(path))[150] - HEAD_SIZE - 6
+        record = arrival_offsets(write_recording(path, CHUNKS, {"seed": "1"}))[150] - HEAD_SIZE - 6
         assert struct.unpack_from("<B", path.read_bytes(), record) == (5,)
         damage(path, record + offset, bit)
         recording = open_recording(path)

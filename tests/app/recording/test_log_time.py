@@ -12,10 +12,11 @@ from mcap.reader import make_reader
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_parts, open_recording, utc_offset_ns
 from echostep.recording.mcap_records import METADATA_NAME
-from echostep_app.recording.recorder import Recorder, begin_file
+from echostep_app.recording.recorder import begin_file
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import cut, repair
 from echostep_app.recording.splitting import SplitLimit, numbered_recorder
+from recording.damages import write_recording
 
 STARTED_NS = 987_654_321_987
 CLOCK = {"started_utc": "2026-11-26T10:00:00.123+00:00", "started_ns": str(STARTED_NS)}
@@ -24,9 +25,7 @@ CHUNKS = [Chunk("board", STARTED_NS + k * 10_000_003, b"x" * (k % 7 + 1)) for k 
 
 
 def recorded(path: Path, metadata: dict[str, str]) -> Path:
-    with Recorder(path, metadata) as recorder:
-        for chunk in CHUNKS:
-            recorder.write(chunk)
+    write_recording(path, CHUNKS, metadata)
     return path
 
 

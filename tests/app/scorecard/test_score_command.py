@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
@@ -36,18 +37,13 @@ def _write(path: Path, names: str, table: Any) -> None:
     np.savetxt(path, table, delimiter=",", header=names, comments="", fmt="%.6f")
 
 
+def score(folder: Path, *words: object) -> CompletedProcess[str]:
+    """The command's end, with the true way of the folder."""
+    return echostep("score", *words, "--truth", folder / "truth.csv")
+
+
 def test_the_table_has_a_column_a_track_and_says_what_was_read(folder: Path) -> None:
-    done = echostep(
-        "score",
-        folder / "ours.csv",
-        folder / "<b>[red]theirs.csv",
-        "--truth",
-        folder / "truth.csv",
-        "--plan",
-        PLAN,
-        "--setup",
-        90,
-    )
+    done = score(folder, folder / "ours.csv", folder / "<b>[red]theirs.csv", "--plan", PLAN, "--setup", 90)
     assert (done.returncode, done.stderr) == (0, "")
     assert "ours.csv: time is t_s, x is x_m, y is y_m, radius95 is radius95_m" in done.stdout
     assert "<b>[red]theirs.csv" in done.stdout
@@ -57,7 +53,7 @@ def test_the_table_has_a_column_a_track_and_says_what_was_read(folder: Path) -> 
 
 
 def test_json_has_every_figure_and_null_for_none(folder: Path) -> None:
-    done = echostep("score", folder / "<b>[red]theirs.csv", "--truth", folder / "truth.csv", "--json")
+    done = score(folder, folder / "<b>[red]theirs.csv", "--json")
     tree = json.loads(done.stdout)
     (card,) = tree["tracks"]
     assert (card["ce50_m"], card["ce95_m"], card["evaal_m"]) == pytest.approx((1.0, 1.0, 1.0))
@@ -67,8 +63,8 @@ def test_json_has_every_figure_and_null_for_none(folder: Path) -> None:
 
 def test_a_fault_is_one_line_and_status_2(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_text("t,x,y\n1,2,three\n")
-    done = echostep("score", tmp_path / "bad.csv", "--truth", folder / "truth.csv")
+    done = score(folder, tmp_path / "bad.csv")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == f"echostep: {tmp_path}/bad.csv:2: column y: 'three' is not a number\n"
-    missing = echostep("score", tmp_path / "none.csv", "--truth", folder / "truth.csv")
+    missing = score(folder, tmp_path / "none.csv")
     assert missing.stderr == f"echostep: {tmp_path}/none.csv: cannot read it: No such file or directory\n"

@@ -148,7 +148,7 @@ def test_from_the_bytes_of_the_sensors_to_the_mayday_within_35_s() -> None:
     pause = int(np.argmax(np.diff(moving)))
     begin_s, end_s = (scenario.walk.t_s[moving[pause + k]] for k in (0, 1))
     tracker, told_s = Tracker(PLAN, scenario.start, seed=1), math.nan
-    alarm = watch_of(tracker).wearer_alarm
+    alarm = watch_of(tracker)
     for k in range(0, len(chunks), 20):
         tracker.take(portion_of(chunks[k : k + 20]))
         if math.isnan(told_s) and alarm.alarm and alarm.alarm.kind is MAYDAY:
@@ -168,7 +168,7 @@ def test_taps_are_chunks_and_a_replay_has_the_same_alarms() -> None:
     for k, tap in enumerate(taps):
         chunks.insert(third + 500 * k, Chunk(PERSON, at_ns, tap.encode()))
     live, replayed = (Tracker(PLAN, scenario.start, seed=1) for _ in range(2))
-    alarm, again = watch_of(live).wearer_alarm, watch_of(replayed).wearer_alarm
+    alarm, again = watch_of(live), watch_of(replayed)
     for k in range(0, len(chunks), 50):
         live.take(portion_of(chunks[k : k + 50]))
     for k in range(0, len(chunks), 5000):
@@ -248,7 +248,7 @@ def test_from_the_bytes_of_the_sensors_and_the_same_in_portions_of_any_size(belt
     changes = []
     for size in (37, 100_000):
         tracker = Tracker(PLAN, Pose(2.0, 7.5, 0.0), seed=1)
-        alarm = watch_of(tracker).wearer_alarm
+        alarm = watch_of(tracker)
         for k in range(0, len(chunks), size):
             tracker.take(portion_of(chunks[k : k + size]))
         changes.append(list(alarm.changes))

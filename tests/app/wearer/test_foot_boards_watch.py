@@ -32,4 +32,4 @@ def test_the_belt_of_the_real_firmware_tells_an_upright_trunk_and_no_fall() -> N
     known = [tilt for tilt in tilts_deg if not math.isnan(tilt)]
     assert len(known) > 0.5 * len(tilts_deg)
     assert max(known) < 20.0
-    assert not watch.wearer_alarm.changes
+    assert not watch.changes

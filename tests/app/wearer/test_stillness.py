@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from echostep.arrays import Floats
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry import AlarmKind
-from echostep_app.wearer.alarm import ASK_S, SWAY_S, WearerAlarm
+from echostep_app.wearer.alarm import ASK_S, SWAY_S
 from echostep_app.wearer.stillness import MOST_SAMPLES, WINDOW_S, MotionWindows, Stillness, Window
 from echostep_app.wearer.tenths import LEAST_SAMPLES, TENTH_S, Tenth, Tenths
-from echostep_app.wearer.wearer_signs import StepTaken
+from wearer.test_alarm import walked
 
 
 def samples(seconds: float, moves_s: tuple[float, ...], seed: int = 0) -> tuple[Floats, Floats]:
@@ -182,10 +182,7 @@ def test_the_result_does_not_depend_on_portions(cut: int) -> None:
 
 
 def test_sway_alone_keeps_the_question_back_for_two_minutes() -> None:
-    alarm = WearerAlarm()
-    for k in range(5):
-        alarm.add([StepTaken(1.0 + k)])
-    alarm.add([Window(k / 2.0, True) for k in range(1, 21)])
+    alarm = walked()
     for k in range(21, 21 + 2 * int(SWAY_S + ASK_S) - 2):
         alarm.add([Window(k / 2.0, False, True)])
         assert alarm.alarm is None
@@ -196,10 +193,7 @@ def test_sway_alone_keeps_the_question_back_for_two_minutes() -> None:
 
 
 def test_a_mayday_does_not_end_by_sway() -> None:
-    alarm = WearerAlarm()
-    for k in range(5):
-        alarm.add([StepTaken(1.0 + k)])
-    alarm.add([Window(k / 2.0, True) for k in range(1, 21)])
+    alarm = walked()
     alarm.add([Window(k / 2.0, False) for k in range(21, 90)])
     alarm.add([Window(k / 2.0, False, True) for k in range(90, 120)])
     assert alarm.alarm is not None

@@ -10,7 +10,7 @@ import csv
 from pathlib import Path
 
 from echostep.file_mode import claim
-from echostep_app.guidance.cues import Cue
+from echostep_app.guidance.cues import Cue, Guide
 from echostep_app.plan.routing import Route
 
 CUE_COLUMNS = ("t_s", "kind", "arrow_rad", "left_m", "text", "spoken")
@@ -22,6 +22,7 @@ class CueList:
     def __init__(self) -> None:
         self.cues: list[Cue] = []
         self._returned = 0
+        self._guide: Guide | None = None  # None as long as there is no route
 
     @property
     def cue(self) -> Cue | None:
@@ -31,7 +32,7 @@ class CueList:
     @property
     def route(self) -> Route | None:
         """The present route."""
-        return None
+        return self._guide.route if self._guide else None
 
     def news(self) -> list[Cue]:
         """The cues since the last call."""

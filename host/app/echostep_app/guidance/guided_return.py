@@ -31,13 +31,7 @@ class GuidedReturn(CueList):
         self.is_wanted = is_wanted
         self._tracker = tracker
         self._way = OwnWay()
-        self._guide: Guide | None = None
         tracker.watchers.append(self._watch)
-
-    @property
-    def route(self) -> Route | None:
-        """The way back."""
-        return self._guide.route if self._guide else None
 
     def _way_from(self, start: RoutePlace) -> Route:
         """The way back from a position."""

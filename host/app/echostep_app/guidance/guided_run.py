@@ -19,7 +19,7 @@ from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import Cue, CueKind, Guide
 from echostep_app.guidance.guided_return import GuidedReturn
-from echostep_app.plan.routing import EXIT, Goal, Route, RoutePlace, Routes
+from echostep_app.plan.routing import EXIT, Goal, RoutePlace, Routes
 
 NO_WAY = "Stop. No way leads there from here"
 ARRIVED = ("You have arrived", "You are outside")  # at a place, at an exit
@@ -68,7 +68,6 @@ class GuidedRun(CueList):
         self._tracker = tracker
         self._again = partial(Routes(tracker.plan).way, end=to)
         self._arrived = ARRIVED[to == EXIT]
-        self._guide: Guide | None = None
         self._searched_s = -math.inf
         at = to if isinstance(to, RoutePlace) else tracker.plan.exits[0]
         with contextlib.suppress(EchostepError) if to == EXIT else contextlib.nullcontext():
@@ -77,11 +76,6 @@ class GuidedRun(CueList):
                 Estimate(0.0, at.x_m + FAR_M, at.y_m, 1.0, 0.0, 1.0, 0.0, 0.0, 0, TrackStatus.TRACKING, at.level)
             )  # lays the grids and compiles the kernels now, not during the run
         tracker.watchers.append(self._watch)
-
-    @property
-    def route(self) -> Route | None:
-        """The present route."""
-        return self._guide.route if self._guide else None
 
     def _watch(self, _: MeasuredSegment | None, e: Estimate) -> None:
         """Add the cue of a new estimate."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The way back along the way that was walked, for buildings without a plan.
 
-In: positions in order of time. Out: the shortest way back to the first one along them, and its length. Owns the positions.
+In: positions in order of time. Out: the shortest way back to the first one along them. Owns the positions.
 
 Each position is joined to the one before it, and to every earlier one so near that the way has passed there again; of these the one with the
 shortest way back is kept [Dijkstra 1959, by induction: a way back runs only through earlier positions]. So a loop is cut where it closes, as far as
@@ -32,17 +32,11 @@ class OwnWay:
         self._cells: defaultdict[tuple[int, int], list[int]] = defaultdict(list)  # positions by cell of JOIN_M
         self._here = -1  # the present position; -1 before the first
 
-    @property
-    def back_m(self) -> float:
-        """Length of the way back from the present position; 0 before the first."""
-        return self._back_m[self._here] if self._at else 0.0
-
-    def add(self, x_m: float, y_m: float, z_m: float = 0.0) -> float:
-        """Walk to a new position, unless it is nearly the present one; returns the distance."""
+    def add(self, x_m: float, y_m: float, z_m: float = 0.0) -> None:
+        """Walk to a new position, unless it is nearly the present one."""
         here = (x_m, y_m, z_m)
-        walked_m = math.dist(self._at[self._here][:2], here[:2]) if self._at else 0.0
-        if self._at and walked_m < STEP_M:
-            return 0.0
+        if self._at and math.dist(self._at[self._here][:2], here[:2]) < STEP_M:
+            return
         new = len(self._at)
         ways = [(self._back_m[k] + math.dist(self._at[k][:2], here[:2]), k) for k in self._joined(here)]
         back_m, following = min(ways, default=(0.0, new))
@@ -51,7 +45,6 @@ class OwnWay:
         self._back_m.append(back_m)
         self._cells[_cell(x_m, y_m)].append(new)
         self._here = new
-        return walked_m
 
     def go_back_to(self, left_m: float) -> None:
         """Move to the position on the way back from which at least `left_m` is left."""

@@ -15,6 +15,7 @@ import struct
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep_app.printing.lines import as_error
 
 COUNTER = struct.Struct("<Q")
 TAG_SIZE = 16  # bytes: 128 bits cannot be guessed
@@ -25,12 +26,10 @@ LARGEST_FILE = 1024  # bytes, of a key's file
 
 def read_key(path: Path) -> bytes:
     """The key in a file, as hexadecimal digits; raises EchostepError when there is none."""
+    with as_error(f"{path}: cannot read the key"), path.open("rb") as file:
+        text = file.read(LARGEST_FILE)
     try:
-        with path.open("rb") as file:
-            text = file.read(LARGEST_FILE).decode("ascii").strip()
-        key = bytes.fromhex(text)
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read the key: {error.strerror}") from error
+        key = bytes.fromhex(text.decode("ascii").strip())
     except ValueError as error:
         raise EchostepError(
             f"{path}: not a key: expected hexadecimal digits; make one: openssl rand -hex 32"

@@ -12,6 +12,7 @@ import socket
 from urllib.parse import urlsplit
 
 from echostep.errors import EchostepError
+from echostep_app.printing.lines import as_error
 
 READ_TIMEOUT_S = 0.1  # the reading thread sees `close` in time
 CONNECT_TIMEOUT_S = 3.0
@@ -29,14 +30,9 @@ class TcpPort:
             raise EchostepError(f"{url}: {error}; expected socket://HOST:PORT") from error
         if not host or port is None or parts.path or parts.query:
             raise EchostepError(f"{url}: expected socket://HOST:PORT, for instance socket://127.0.0.1:7011")
-        try:
+        with as_error(f"{url}: cannot connect", "; is ser2net, or what gives the port, running there?"):
             self._socket = socket.create_connection((host, port), CONNECT_TIMEOUT_S)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        except OSError as error:
-            why = error.strerror or str(error)
-            raise EchostepError(
-                f"{url}: cannot connect: {why}; is ser2net, or what gives the port, running there?"
-            ) from error
         self._socket.settimeout(write_timeout_s)
 
     @property

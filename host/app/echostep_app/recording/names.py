@@ -17,6 +17,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.file_mode import file_mode
 from echostep.recording import SUFFIX, is_being_written
+from echostep_app.printing.lines import as_error
 
 try:
     import fcntl
@@ -35,11 +36,9 @@ def create(path: Path) -> int:
     """A new file, open for writing and locked for this process; raises EchostepError when it cannot be made, or exists."""
     if os.path.lexists(path):
         raise RecordingExistsError(f"{path}: exists, and is not overwritten: give another name")
-    try:
+    with as_error(f"{path}: cannot write"):
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), file_mode())
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot write: {error.strerror}") from error
     with suppress(OSError):  # a file system without locks
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -13,7 +13,6 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any, Self
 
 from mcap.records import Channel, Schema
@@ -120,7 +119,7 @@ class Recorder:
         if self._file.unwritten_bytes > RAW_LIMIT:
             self.lost_chunks += 1
             return
-        channel = self._channels.get(chunk.port) or self._register_port(chunk.port)
+        channel = self._channels.get(chunk.port) or self._register(chunk.port, f"/{chunk.port}/bytes", RAW_ENCODING, 0)
         self._add_message(channel, chunk.t_arrival_ns + self.log_offset_ns, chunk.data)
 
     def wait_for_disk(self, chunk: Chunk) -> None:
@@ -158,9 +157,6 @@ class Recorder:
     def _close_chunk(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call]
 
-    def _register_port(self, port: str) -> int:
-        return self._register(port, f"/{port}/bytes", RAW_ENCODING, 0)
-
     def _register_topic(self, topic: Topic) -> int:
         name, encoding, schema = topic.schema_name, "jsonschema", topic.schema.encode()
         number = self._writer.register_schema(name, encoding, schema)
@@ -182,7 +178,5 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -63,29 +63,30 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
     """Compare a track with the truth; raises EchostepError where they have no moment in common."""
     at = match(track, truth)
     error = at.xy_m - at.true_xy_m
-    horizontal = at.error_m
+    off_m = at.error_m
     height = None if at.height_m is None or at.true_height_m is None else at.height_m - at.true_height_m
-    vertical = None if height is None else np.abs(height)[np.isfinite(height)]
-    spherical = None if height is None else np.hypot(horizontal, height)[np.isfinite(height)]
+    horizontal = error_statistics(off_m)
+    vertical = None if height is None else _statistics(np.abs(height))
+    spherical = None if height is None else _statistics(np.hypot(off_m, height))
     xx, xy, _, yy = np.cov(error.T, bias=True).ravel().tolist()
     floors = _floors_off(at)
-    latency = None if track.latency_s is None else track.latency_s[at.row]
+    latency = None if track.latency_s is None else _statistics(track.latency_s[at.row])
     radius, protection = (None if r is None else r[at.row] for r in (track.radius95_m, track.protection_m))
     covered, available = _coverage(track, truth)
     return Scorecard(
-        track=str(track.path), points=len(horizontal), span_s=float(at.t_s[-1] - at.t_s[0]),
-        horizontal=error_statistics(horizontal), vertical=_statistics(vertical), spherical=_statistics(spherical),
+        track=str(track.path), points=horizontal.count, span_s=float(at.t_s[-1] - at.t_s[0]),
+        horizontal=horizontal, vertical=vertical, spherical=spherical,
         bias_m=float(np.hypot(*error.mean(0))), covariance_m2=(xx, xy, yy),
-        ce50_m=quantile(horizontal, 0.5), ce95_m=quantile(horizontal, 0.95),
-        ve95_m=_quantile(vertical, 0.95), se95_m=_quantile(spherical, 0.95),
+        ce50_m=horizontal.median_m, ce95_m=horizontal.p95_m,
+        ve95_m=vertical.p95_m if vertical else None, se95_m=spherical.p95_m if spherical else None,
         floor_probability=None if floors is None else _share(floors == 0.0, np.isfinite(floors)),
         zone_probability=None if plan is None else _zone_probability(at, plan),
         coverage=covered, availability=available,
-        latency_mean_s=_mean(latency), latency_p95_s=_quantile(latency, 0.95), setup_s=setup_s,
-        evaal_m=quantile(horizontal + FLOOR_PENALTY_M * (0.0 if floors is None else np.nan_to_num(floors)), 0.75),
+        latency_mean_s=latency.mean_m if latency else None, latency_p95_s=latency.p95_m if latency else None, setup_s=setup_s,
+        evaal_m=quantile(off_m + FLOOR_PENALTY_M * (0.0 if floors is None else np.nan_to_num(floors)), 0.75),
         evaal_knows_floors=floors is not None,
-        ellipse95_holds=_ellipse_holds(track, at, error), radius95_holds=_holds(radius, horizontal),
-        protection_holds=_holds(protection, horizontal),
+        ellipse95_holds=_ellipse_holds(track, at, error), radius95_holds=_holds(radius, off_m),
+        protection_holds=_holds(protection, off_m),
     )  # fmt: skip
 
 
@@ -138,18 +139,10 @@ def _share(right: Bools, of: Bools) -> float | None:
     return float(right[of].mean()) if of.any() else None
 
 
-def _statistics(error_m: Floats | None) -> ErrorStatistics | None:
-    return None if error_m is None or not len(error_m) else error_statistics(error_m)
-
-
-def _mean(values: Floats | None) -> float | None:
-    finite = values[np.isfinite(values)] if values is not None else np.zeros(0)
-    return float(finite.mean()) if len(finite) else None
-
-
-def _quantile(values: Floats | None, share: float) -> float | None:
-    finite = values[np.isfinite(values)] if values is not None else np.zeros(0)
-    return quantile(finite, share) if len(finite) else None
+def _statistics(values: Floats) -> ErrorStatistics | None:
+    """Of the finite values, in their unit; None without one."""
+    finite = values[np.isfinite(values)]
+    return error_statistics(finite) if len(finite) else None
 
 
 NO_ZONE = -1
@@ -194,7 +187,7 @@ GAP_S = 2.5
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """A track and the truth at n points: places (n, 2) in metres, heights (n,), floors (n,); None where one of the two does not state them.
+    """A track and the truth at n points: places (n, 2) in metres, heights (n,), floors (n,); None where the file does not state them.
 
     `row` (n,): the track's row at the point, or the newest one before it.
     """
@@ -241,24 +234,20 @@ def match(track: ScoredPath, truth: ScoredPath) -> Matched:
         )
     t_s = grid.t_s[chosen]
     true_row = chosen if surveyed else np.searchsorted(truth.t_s, t_s, side="right") - 1
-    levels = track.level is not None and truth.level is not None
-    heights = track.height_m is not None and truth.height_m is not None
-    return Matched(
-        t_s,
-        np.column_stack([_at(track, track.xy_m[:, k], t_s, row, exact=not surveyed) for k in (0, 1)]),
-        np.column_stack([_at(truth, truth.xy_m[:, k], t_s, true_row, exact=surveyed) for k in (0, 1)]),
-        row,
-        _at(track, track.height_m, t_s, row, exact=not surveyed) if heights else None,
-        _at(truth, truth.height_m, t_s, true_row, exact=surveyed) if heights else None,
-        track.level[row] if levels and track.level is not None else None,
-        truth.level[true_row] if levels and truth.level is not None else None,
-    )
+    xy_m, height_m, level = _at(track, t_s, row, exact=not surveyed)
+    true_xy_m, true_height_m, true_level = _at(truth, t_s, true_row, exact=surveyed)
+    return Matched(t_s, xy_m, true_xy_m, row, height_m, true_height_m, level, true_level)
 
 
-def _at(path: ScoredPath, values: Floats | None, t_s: Floats, row: Ints, *, exact: bool) -> Floats:
-    """Values of a path at times (m,): the rows' values (m,) if they are exact, else linear between the rows."""
-    assert values is not None
-    return values[row] if exact else np.asarray(np.interp(t_s, path.t_s, values))
+def _at(path: ScoredPath, t_s: Floats, row: Ints, *, exact: bool) -> tuple[Floats, Floats | None, Floats | None]:
+    """Places (m, 2), heights and floors (m,) of a path at times (m,): the rows' values if they are exact, else linear between, but the floors."""
+
+    def at(values: Floats) -> Floats:
+        return values[row] if exact else np.asarray(np.interp(t_s, path.t_s, values))
+
+    height_m = None if path.height_m is None else at(path.height_m)
+    level = None if path.level is None else path.level[row]
+    return np.column_stack([at(axis_m) for axis_m in path.xy_m.T]), height_m, level
 
 
 def _near(t_s: Floats, at: Floats) -> Bools:

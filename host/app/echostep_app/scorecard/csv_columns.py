@@ -52,29 +52,25 @@ class CsvColumns:
 
     def numbers(self, name: str, *, gaps: bool = False) -> Floats:
         """A column (n,) of numbers, finite unless `gaps`: then an empty cell is NaN, and infinity is allowed."""
-        k = self.names.index(name)
-        return np.array(
-            [self._number(row[k], line, name, gaps) for row, line in zip(self.rows, self.lines, strict=True)]
-        )
+        return np.array([self._number(row, name, cell, gaps) for row, cell in enumerate(self.texts(name))])
 
     def error(self, row: int, name: str, what: str) -> EchostepError:
         """An error about a cell."""
         return EchostepError(f"{self.path}:{self.lines[row]}: column {name}: {what}")
 
-    def _number(self, cell: str, line: int, name: str, gaps: bool) -> float:
-        where = f"{self.path}:{line}: column {name}"
+    def _number(self, row: int, name: str, cell: str, gaps: bool) -> float:
         if not cell:
             if gaps:
                 return math.nan
-            raise EchostepError(f"{where}: the cell is empty, a number is expected")
+            raise self.error(row, name, "the cell is empty, a number is expected")
         try:
             value = float(cell)
         except ValueError as error:
-            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a number") from error
+            raise self.error(row, name, f"{cell[:SHOWN]!r} is not a number") from error
         if not gaps and not math.isfinite(value):
-            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is not a finite number")
+            raise self.error(row, name, f"{cell[:SHOWN]!r} is not a finite number")
         if math.isfinite(value) and abs(value) > GREATEST:
-            raise EchostepError(f"{where}: {cell[:SHOWN]!r} is greater than any number of a track, {GREATEST:g}")
+            raise self.error(row, name, f"{cell[:SHOWN]!r} is greater than any number of a track, {GREATEST:g}")
         return value
 
 

@@ -146,17 +146,12 @@ def watch_of(tracker: Tracker) -> AlarmWatch:
     return tracker.watch
 
 
-class AlarmWatch(WearerSigns):
+class AlarmWatch(WearerAlarm, WearerSigns):
     """The signs of a tracker's wearer, handed to the alarm message by message."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.wearer_alarm = WearerAlarm()
-
-    @property
-    def alarm(self) -> Alarm | None:  # type: ignore[override]  # read only
-        """The present alarm."""
-        return self.wearer_alarm.alarm
+        WearerAlarm.__init__(self)
+        WearerSigns.__init__(self)
 
     def trunk_tilt_rad(self, t_s: float) -> float:
         """The trunk's tilt at a time; NaN if the belt does not give it."""
@@ -164,12 +159,4 @@ class AlarmWatch(WearerSigns):
 
     def advance(self) -> None:
         """Hand the signs to the alarm."""
-        self.wearer_alarm.add(self.pop())
-
-    def call_for_help(self, t_s: float) -> None:
-        """Raise a mayday."""
-        self.wearer_alarm.call_for_help(t_s)
-
-    def answer(self, t_s: float, *, ends_help: bool) -> None:
-        """A tap is a sign of life."""
-        self.wearer_alarm.answer(t_s, ends_help=ends_help)
+        self.add(self.pop())

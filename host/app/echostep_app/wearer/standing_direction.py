@@ -53,7 +53,9 @@ class StandingDirection:
 
     def tilt_rad(self, force: Vector) -> float:
         """Angle from the standing direction to a force (3,); NaN while it is not known, or for a force that was not measured."""
-        return _angle(self._up, force)
+        size = math.hypot(*force)
+        cosine = _dot(self._up, force) / size if size > 0.0 else math.nan
+        return math.acos(max(-1.0, min(cosine, 1.0))) if not math.isnan(cosine) else math.nan
 
     def sideways(self, force: Vector) -> float:
         """Share of a force along the axis about which the sensor turns most in walking: of a foot, from its right to its left."""
@@ -68,9 +70,3 @@ def _unit(vector: Floats) -> Vector:
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _angle(up: Vector, force: Vector) -> float:
-    size = math.hypot(*force)
-    cosine = _dot(up, force) / size if size > 0.0 else math.nan
-    return math.acos(max(-1.0, min(cosine, 1.0))) if not math.isnan(cosine) else math.nan

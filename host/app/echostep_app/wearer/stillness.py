@@ -125,9 +125,8 @@ class Stillness:
 
     def __init__(self) -> None:
         self._foot = MotionWindows(np.array([FOOT_RAD_S] * 3 + [FOOT_M_S2] * 3), 3)
-        self._legs = MotionWindows(
-            np.array([LEG_RAD_S] * 3), 2
-        )  # sway of thigh and shank: a belt turns with each breath
+        # Sway of thigh and shank: a belt turns with each breath
+        self._legs = MotionWindows(np.array([LEG_RAD_S] * 3), 2)
         self._worn: set[MotionWindows] = set()
 
     def add_foot(self, t_s: Floats, gyro: Floats, accel: Floats) -> list[tuple[int, Window]]:

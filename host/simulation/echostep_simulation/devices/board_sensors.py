@@ -45,9 +45,8 @@ class WornGyro:
     scale: float = 0.02
     wander_rad_s: float = math.radians(0.03)  # of a gyro of its class, 0.02 to 0.1
     wander_s: float = 100.0
-    walking_rad_s: float = math.radians(
-        0.06
-    )  # two belts on one pelvis differ by 0.08 deg/s in walking, by 0.01 at rest [legs_qmt]
+    # Two belts on one pelvis differ by 0.08 deg/s in walking, by 0.01 at rest [legs_qmt]
+    walking_rad_s: float = math.radians(0.06)
     jitter_rad: float = math.radians(1.0)  # 0.9 to 1.2 degrees from stride to stride [legs_qmt]
     jitter_s: float = 1.0
 

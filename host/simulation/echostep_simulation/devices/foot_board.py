@@ -21,15 +21,14 @@ from echostep.board.reports import SUBSCRIBE
 from echostep.ports.chunks import FOOT, Chunk
 from echostep_simulation.devices.board import Board
 from echostep_simulation.devices.mtx import means, specific_force_and_rate
+from echostep_simulation.devices.serial_delivery import usb_chunks
 from echostep_simulation.people.walker import RATE_HZ, Walk
 from echostep_simulation.stimulus import EXTENDED_ROW, NO_SYNC
 
 HEAD_START_MS = 1700  # time for which the foot board has power before the belt board: two boards do not start together
 BLOCK_MS = 50
-USB_LATENCY_NS = 1_000_000
-INTERPOLATED = math.sqrt(
-    1.5
-)  # the twin takes values between two rows, which leaves two thirds of a white noise's variance
+# The twin takes values between two rows, which leaves two thirds of a white noise's variance
+INTERPOLATED = math.sqrt(1.5)
 CELSIUS = 24.0
 
 
@@ -83,17 +82,13 @@ class FootBoardPort:
         board.fault("crystal=drift")
         board.send(encode(SUBSCRIBE, 0))
         for start in range(-HEAD_START_MS, 0, BLOCK_MS):
-            board.advance(
-                self.sensors.rows(start, start + BLOCK_MS)
-            )  # the host listens from the beginning of the walk on
+            # The host listens from the beginning of the walk on
+            board.advance(self.sensors.rows(start, start + BLOCK_MS))
 
     def chunks(self, start: int, stop: int, origin_ns: int) -> list[Chunk]:
         """Chunks that the host gets in these milliseconds; `origin_ns`: the host's clock at the walk's beginning."""
-        gathered: dict[int, bytes] = {}
-        for t_ns, part in self.board.advance(self.sensors.rows(start, stop)):
-            arrival = origin_ns + t_ns - HEAD_START_MS * 1_000_000 + USB_LATENCY_NS
-            gathered[arrival] = gathered.get(arrival, b"") + part
-        return [Chunk(FOOT, t_ns, part) for t_ns, part in gathered.items()]
+        sent = self.board.advance(self.sensors.rows(start, stop))
+        return usb_chunks(FOOT, sent, origin_ns - HEAD_START_MS * 1_000_000)
 
 
 def foot_rng(seed: int) -> np.random.Generator:

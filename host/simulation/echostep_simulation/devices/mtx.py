@@ -117,16 +117,8 @@ def measure(
     mounting = rotations(np.array([model.mounting_rpy_rad]))[0]
     force, rate = (means(v, t, period) for v in specific_force_and_rate(walk, mounting))
     root = math.sqrt(model.rate_hz)
-    accel = (
-        force
-        + model.accel_bias_m_s2 * rng.standard_normal(3)
-        + model.accel_noise * root * rng.standard_normal(force.shape)
-    )
-    gyro = (
-        rate
-        + model.gyro_bias_rad_s * rng.standard_normal(3)
-        + model.gyro_noise * root * rng.standard_normal(rate.shape)
-    )
+    accel = _with_errors(force, model.accel_bias_m_s2, model.accel_noise * root, rng)
+    gyro = _with_errors(rate, model.gyro_bias_rad_s, model.gyro_noise * root, rng)
     at = np.minimum((t * RATE_HZ).astype(int), len(walk.t_s) - 1)
     r = rotations(walk.foot_rpy_rad[at]) @ mounting
     field = magnetism.field(walk.foot_m[at, :2]) if magnetism else np.tile(EARTH, (len(t), 1))
@@ -136,15 +128,16 @@ def measure(
         gyro += r[:, 2] * turn[:, None] / period
         field = np.einsum("nji,nj->ni", rotations(np.cumsum(turn)[:, None] * [0.0, 0.0, 1.0]), field)
     mag = np.einsum("nji,nj->ni", r, field) + model.mag_noise * rng.standard_normal(r.shape[:2])
+    accel = np.clip(accel, -ACCEL_LIMIT_M_S2, ACCEL_LIMIT_M_S2)
+    gyro = np.clip(gyro, -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S)
     if model.filter is None:
-        world = _mt_world(_believed(r, field, model, period, rng))
-    accel, gyro = (
-        np.clip(accel, -ACCEL_LIMIT_M_S2, ACCEL_LIMIT_M_S2),
-        np.clip(gyro, -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S),
-    )
-    if model.filter is not None:
-        world = orientations(t, accel, gyro, mag, model.filter)
-    return MtxSamples(t, accel, gyro, mag, world)
+        return MtxSamples(t, accel, gyro, mag, _mt_world(_believed(r, field, model, period, rng)))
+    return MtxSamples(t, accel, gyro, mag, orientations(t, accel, gyro, mag, model.filter))
+
+
+def _with_errors(true: Floats, bias: float, noise: float, rng: np.random.Generator) -> Floats:
+    """Measurements (n, 3) with a constant error and with noise, given as standard deviations."""
+    return true + bias * rng.standard_normal(3) + noise * rng.standard_normal(true.shape)
 
 
 def _believed(r: Floats, field: Floats, model: MtxModel, period: float, rng: np.random.Generator) -> Floats:

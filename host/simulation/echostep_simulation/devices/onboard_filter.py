@@ -20,7 +20,6 @@ size at which machines a few metres away matter; their moments (`simulation.trai
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +33,7 @@ NEAR_ZERO = 1e-6  # of a norm whose direction is undefined, m/s2 or the field's 
 SMALL_RAD = 1e-9  # below this angle the limits of sin(a)/a and (1 - cos(a))/a^2 are used
 
 
-@dataclass(frozen=True, slots=True)
-class OnBoardFilter:
+class OnBoardFilter(NamedTuple):
     """`level_s`, `north_s`: time constants of the corrections of tilt and heading.
 
     `calm_field`: relative deviation from the first field strength at which the heading correction is halved: "attempts to compensate for magnetic
@@ -45,14 +43,6 @@ class OnBoardFilter:
     level_s: float = 15.0
     north_s: float = 5.0
     calm_field: float = 0.5
-
-
-class _Gains(NamedTuple):
-    """The fields of `OnBoardFilter`."""
-
-    level_s: float
-    north_s: float
-    calm_field: float
 
 
 class _Samples(NamedTuple):
@@ -74,17 +64,15 @@ def orientations(
     """
     import scipy  # noqa: F401  # numba multiplies matrices with its BLAS
 
-    settings = settings or OnBoardFilter()
     field = np.zeros((len(t_s), 3)) if mag is None else np.nan_to_num(mag, nan=0.0, posinf=0.0, neginf=0.0)
     matrices = np.empty((len(t_s), 3, 3))
     samples = _Samples(*(np.ascontiguousarray(v, np.float64) for v in (t_s, accel, gyro, field)))
-    gains = _Gains(float(settings.level_s), float(settings.north_s), float(settings.calm_field))
-    _filter(samples, gains, matrices)
+    _filter(samples, settings or OnBoardFilter(), matrices)
     return matrices
 
 
 @kernel
-def _filter(samples: _Samples, gains: _Gains, matrices: Floats) -> None:
+def _filter(samples: _Samples, gains: OnBoardFilter, matrices: Floats) -> None:
     """Fill `matrices` (n, 3, 3), sample by sample: propagate by the gyros, then correct tilt and heading."""
     t_s, accel, gyro, mag = samples
     level_s, north_s, calm_field = gains

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a serial line to the host: when bytes arrive, and in which portions.
+"""From a serial line or a board's USB to the host: when bytes arrive, and in which portions.
 
 In: frames and when the device begins to send each. Out: portions as the driver of an FTDI adapter hands them over. Owns nothing.
 The adapter sends its buffer when 62 bytes have come or when its latency timer runs out, whichever is first [FTDI AN232B-04].
@@ -7,14 +7,27 @@ The adapter sends its buffer when 62 bytes have come or when its latency timer r
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterable
+
 import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel
+from echostep.ports.chunks import Chunk
 
 FULL = 62  # bytes in a USB packet of 64, two of them status
 BITS = 10  # a byte on the line: start, eight, stop
 WAKE_S = 0.0002  # mean time until the reading program gets to run
+USB_LATENCY_NS = 1_000_000
+
+
+def usb_chunks(port: str, sent: Iterable[tuple[int, bytes]], origin_ns: int) -> list[Chunk]:
+    """A board's bytes as a USB host gets them, those of one instant together; `origin_ns`: the host's clock at the board's time 0."""
+    gathered: defaultdict[int, bytes] = defaultdict(bytes)
+    for t_ns, part in sent:
+        gathered[origin_ns + t_ns + USB_LATENCY_NS] += part
+    return [Chunk(port, t_ns, part) for t_ns, part in gathered.items()]
 
 
 def deliver(

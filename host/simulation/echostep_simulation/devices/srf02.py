@@ -30,9 +30,8 @@ class _Ranger:
     due_us: int = 0
     reads_us: int | None = None  # while it is ranging: when the result is fetched
     own_us: int = 0
-    triggers: deque[tuple[int, int]] = field(
-        default_factory=lambda: deque(maxlen=4)
-    )  # when, and how long to the other ranger
+    # When, and how long to the other ranger
+    triggers: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=4))
 
 
 class Rangers:

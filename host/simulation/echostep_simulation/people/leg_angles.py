@@ -14,29 +14,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 
-THIGH_DEG = (
-    22,
-    21,
-    20,
-    17,
-    13,
-    8,
-    3,
-    -3,
-    -9,
-    -14,
-    -18,
-    -19,
-    -13,
-    -3,
-    9,
-    18,
-    23,
-    25,
-    25,
-    23,
-)  # against the vertical, forward positive
-KNEE_DEG = (5, 10, 16, 18, 17, 14, 11, 8, 6, 7, 11, 21, 37, 52, 60, 58, 47, 30, 13, 4)  # flexion
+# Of the thigh against the vertical, forward positive, and flexion of the knee
+THIGH_DEG = (22, 21, 20, 17, 13, 8, 3, -3, -9, -14, -18, -19, -13, -3, 9, 18, 23, 25, 25, 23)
+KNEE_DEG = (5, 10, 16, 18, 17, 14, 11, 8, 6, 7, 11, 21, 37, 52, 60, 58, 47, 30, 13, 4)
 # Stairs, from a foot's contact on, against the vertical and flexion [Riener 2002; McFadyen and Winter 1988], read to a few degrees.
 UP_THIGH_DEG = (50, 49, 46, 41, 35, 28, 21, 15, 9, 4, 0, -3, -2, 6, 20, 35, 47, 54, 56, 53)
 UP_KNEE_DEG = (62, 61, 58, 52, 45, 38, 31, 25, 19, 14, 11, 12, 22, 42, 65, 83, 91, 88, 79, 69)

@@ -111,8 +111,6 @@ def draw_trail(rng: np.random.Generator) -> Floats:
 
 def _clear(trail: Floats) -> bool:
     """Whether parts of a trail that do not meet keep CLEARANCE_M."""
-    from shapely import LineString
-
     parts = [LineString(trail[k : k + 2]) for k in range(len(trail) - 1)]
     return all(a.distance(b) >= CLEARANCE_M for k, a in enumerate(parts) for b in parts[k + 2 :])
 

@@ -26,10 +26,7 @@ BODY_HEAT = 0.5  # share of an excess above INDOORS_C that is the air's: body an
 # Assumed, tuned on simulated floors (seeds 200 to 209) and on the climbs of loruro/Barometer_STM32
 SEGMENT_S = 0.5
 QUIETEST_M, AIR_SD_M = 0.02, 0.1  # standard deviations: of a segment's noise, at least; of draughts in a height
-SMOOTH_PA, FINEST = (
-    0.02,
-    0.1,
-)  # steps between readings up to this are no quantization; share of the steps that may be finer
+SMOOTH_PA, FINEST = 0.02, 0.1  # steps between readings up to this are no quantization; share that may be finer
 HALF_S = 3.0  # of the window, to either side, over which a speed is measured; longer where noise makes it uncertain
 STILL_M_S = 0.1  # below a slow climb of stairs, landings included
 STAY_M_S = 0.04  # of a whole stay; weather of 2 hPa/h makes 0.005
@@ -148,9 +145,8 @@ def _is_slow(t_s: Floats, height_m: Floats, sd_m: float) -> Bools:
     if len(t_s) < 2:
         return np.ones(len(t_s), bool)
     step_s = float(np.median(np.diff(t_s)))
-    uncertain_s = (4.0 * math.sqrt(2.0 * step_s) * sd_m / STILL_M_S) ** (
-        2.0 / 3.0
-    )  # four standard deviations of the speed
+    # Four standard deviations of the speed
+    uncertain_s = (4.0 * math.sqrt(2.0 * step_s) * sd_m / STILL_M_S) ** (2.0 / 3.0)
     half_s, here = max(HALF_S, 1.5 * step_s, uncertain_s), np.arange(len(t_s))
     begin = np.minimum(np.searchsorted(t_s, t_s - half_s), np.maximum(here - 1, 0))
     end = np.maximum(np.searchsorted(t_s, t_s + half_s, side="right"), np.minimum(here + 2, len(t_s)))

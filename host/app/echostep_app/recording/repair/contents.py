@@ -10,8 +10,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rich.progress import Progress
-
 from echostep.board.messages import SCHEMA_HASH, Identity
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, LATEST_NS, MTX
@@ -19,11 +17,11 @@ from echostep.recording import Decoder, log_offset_ns, utc_offset_ns
 from echostep.recording.damage.notes import made_of
 from echostep.recording.mcap_records import port_of
 from echostep_app.printing.console import console_for_people
+from echostep_app.printing.progress import with_bar
 from echostep_app.recording.capture_summary import refusals
 from echostep_app.recording.repair.recovery import ArrivalOrder, RecordedMessage, Recovery
 
 # All assumed.
-MESSAGES_PER_UPDATE = 5000  # of the progress bar
 LONGEST_LINE = 4000  # characters
 LONGEST_VALUE = 100  # characters of a metadata value on the line of its key
 DECODED_AT_ONCE = 1 << 16  # bytes of one port
@@ -227,10 +225,5 @@ def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:
     """All messages with corrected arrival times, with a progress bar on a terminal."""
-    console = console_for_people(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(title, total=1.0)
-        for message_index, message in enumerate(contents.order.correct(recovery.messages())):
-            if not message_index % MESSAGES_PER_UPDATE:
-                progress.update(task, completed=recovery.fraction)
-            yield message
+    messages = contents.order.correct(recovery.messages())
+    return with_bar(messages, title, lambda: recovery.fraction, console_for_people(stderr=True))

@@ -241,7 +241,5 @@ class ArrivalOrder:
     def _pop(self) -> RecordedMessage:
         """The oldest message; without a successor its time stays."""
         waiting = self._waiting.popleft()
-        if not waiting.settled:
-            waiting.settled = True
-            self._before_ns[waiting.port] = waiting.message.t_ns
+        self._settle(waiting, waiting.message.t_ns)
         return waiting.message

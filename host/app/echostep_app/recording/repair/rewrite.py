@@ -8,14 +8,15 @@ again. Owns the new file.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from mcap.records import Channel, Schema
 
 from echostep.errors import EchostepError
 from echostep.recording.mcap_records import DAMAGE_NAME, METADATA_NAME
+from echostep_app.printing.lines import as_error
 from echostep_app.recording.names import create
 from echostep_app.recording.recorder import begin_file, numbered
 from echostep_app.recording.repair.recovery import RecordedMessage
@@ -42,7 +43,7 @@ class RewrittenRecording:
 
     def write_damage(self, lines: Iterable[str]) -> None:
         """Write the damage of the other recording, after its last message; nothing when it was whole."""
-        with self._report_write_errors():
+        with as_error(f"{self.path}: cannot write"):
             if noted := numbered(lines):
                 self._writer.add_metadata(DAMAGE_NAME, noted)
 
@@ -50,7 +51,7 @@ class RewrittenRecording:
         """Write one message."""
         channel = message.channel
         key = (channel.topic, channel.message_encoding, channel.schema_id)
-        with self._report_write_errors():
+        with as_error(f"{self.path}: cannot write"):
             number = self._channels.get(key) or self._register(channel, key)
             self._writer.add_message(number, message.t_ns, message.body, message.publish_ns, self._sequence)
         self._sequence += 1
@@ -66,7 +67,7 @@ class RewrittenRecording:
 
     def close(self) -> None:
         """Write summary and footer, and close the file."""
-        with self._report_write_errors():
+        with as_error(f"{self.path}: cannot write"):
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
@@ -88,11 +89,3 @@ class RewrittenRecording:
             self._file.close()
         if self.path.is_file():
             self.path.unlink()
-
-    @contextmanager
-    def _report_write_errors(self) -> Iterator[None]:
-        """Raise an OSError as an EchostepError that names the file."""
-        try:
-            yield
-        except OSError as error:
-            raise EchostepError(f"{self.path}: cannot write: {error.strerror}") from error
