@@ -98,7 +98,8 @@ def find_walls(graph: Graph) -> None:
 def _anchored(graph: Graph) -> Bools:
     """Which fragments are within KNOWN_M of path of an end of a closure."""
     way_m, ends = graph.nodes.way_m, np.array([(c.old, c.new) for c in graph.closures], np.int64).ravel()
-    anchored: Bools = (np.abs(way_m[graph.fragments.node, None] - way_m[ends]) < KNOWN_M).any(axis=1)
+    near = np.abs(way_m[graph.fragments.node, None] - way_m[ends]) < KNOWN_M
+    anchored: Bools = np.logical_or.reduce(near, axis=1)
     return anchored
 
 

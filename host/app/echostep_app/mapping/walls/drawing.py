@@ -167,4 +167,4 @@ def _passages(way_m: Floats) -> int:
 
 
 def _selected(lines: Lines, which: Bools) -> Lines:
-    return Lines(*(column[which] for column in lines))
+    return Lines._make(column[which] for column in lines)

@@ -62,7 +62,7 @@ def find_lines(graph: Graph) -> Lines:
 
 def joined(a: Lines, b: Lines) -> Lines:
     """The lines of both."""
-    return Lines(*(np.concatenate(columns) for columns in zip(a, b, strict=True)))
+    return Lines._make(np.concatenate(columns) for columns in zip(a, b, strict=True))
 
 
 def _line(centre: Floats, normal_rad: float, half_m: Floats, base_rad: float | None) -> Floats:
