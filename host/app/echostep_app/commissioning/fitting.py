@@ -238,7 +238,8 @@ def fit_compass_errors(t_s: Floats, rate_rad_s: Floats, compass_rad: Floats) -> 
         raise ValueError(
             "the iron beside the compass is stronger than the earth's field: move the compass away from it"
         )
-    return CompassErrors(*iron.tolist(), float(np.sqrt(np.mean(residuals**2))))
+    b, c, d, e = iron.tolist()
+    return CompassErrors(b, c, d, e, float(np.sqrt(np.mean(residuals**2))))
 
 
 def _check_turn(turn: Floats, compass: Floats) -> None:
