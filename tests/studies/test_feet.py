@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -27,10 +26,6 @@ from foot.foot_walks import any_rotation
 from needs_data import needs_data
 
 needs_recordings = needs_data()
-
-
-def run(*options: object) -> subprocess.CompletedProcess[str]:
-    return echostep("evaluate", "feet", *options)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +91,7 @@ def test_steps_are_told_within_50_ms_of_their_stance(recordings: list[FootRecord
 
 def test_a_folder_without_recordings_is_named(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "nowhere"):
-        done = run("--data", folder)
+        done = echostep("evaluate", "feet", "--data", folder)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
         assert str(folder) in done.stderr
 
@@ -106,7 +101,7 @@ def test_sets_and_files_that_cannot_be_read_are_named_and_skipped(tmp_path: Path
     (tmp_path / "xio_ngimu").symlink_to(DATA / "xio_ngimu")
     (tmp_path / "vicon_pyshoe").mkdir()
     (tmp_path / "vicon_pyshoe" / "broken.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
-    done = run("--data", tmp_path, "--json", tmp_path / "feet.json", "--out", tmp_path)
+    done = echostep("evaluate", "feet", "--data", tmp_path, "--json", tmp_path / "feet.json", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert "broken.mat skipped" in done.stdout
     assert "hallway: skipped" in done.stdout

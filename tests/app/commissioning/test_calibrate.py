@@ -6,7 +6,6 @@ from __future__ import annotations
 import io
 import math
 import re
-import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,8 +25,7 @@ from echostep.legs.kinematics import LegLengths
 from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
-from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer, write_sections
-from echostep_app.commissioning.calibrate import calibrate as calibrate_parts
+from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer, calibrate, write_sections
 from echostep_app.commissioning.fitting import doubt, fit_compass, fit_gyros, fit_legs, fit_mounting, still_bias
 from echostep_app.commissioning.probe import ProbeResult, _Probe
 from echostep_simulation.devices.board import PythonBoard
@@ -38,10 +36,6 @@ from players import pseudo_terminal, python_board, some_noise
 from snapshots import expect, refusal
 
 COUNT_RAD_S = math.radians(0.2439)
-
-
-def calibrate(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return echostep("calibrate", *arguments)
 
 
 def heard(belt: NDArray[Any], bearing: NDArray[Any] | None = None) -> ProbeResult:
@@ -78,7 +72,7 @@ def test_biases_go_into_a_file_that_the_tracker_reads(tmp_path: Path) -> None:
     out = tmp_path / "me.toml"
     out.write_text("[foot]\nheight_m = 1.8\n\n[gyro]\nbelt_reversed = true\n")
     with python_board(usual) as port:
-        done = calibrate("gyros", "--board", port, "--out", out)
+        done = echostep("calibrate", "gyros", "--board", port, "--out", out)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
     settings = parse_settings(out.read_text(), "me.toml")
@@ -204,13 +198,13 @@ def test_an_even_turn_is_no_bias_unless_a_person_says_so(
     monkeypatch.setattr("echostep_app.commissioning.calibrate._probe", lambda *_: heard(EVEN))
     wearer = Wearer(0.43, 0.43, 10.0)
     if answer == "y":
-        calibrate_parts(Ports("x"), ["gyros"], wearer, out, console)
+        calibrate(Ports("x"), ["gyros"], wearer, out, console)
         assert parse_settings(out.read_text(), "me.toml").gyro.belt_bias_rad_s == pytest.approx(
             math.radians(19.7), abs=0.01
         )
     else:
         with pytest.raises(EchostepError, match=r"a turn at an even pace looks like that.*nothing was written of it"):
-            calibrate_parts(Ports("x"), ["gyros"], wearer, out, console)
+            calibrate(Ports("x"), ["gyros"], wearer, out, console)
         assert not out.exists()
     assert bool([prompt for prompt in asked if "Write it all the same? [y/N]" in prompt]) is (answer is not None)
 
@@ -249,7 +243,12 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
             "no such port": ["--board", "/dev/no-such-port", *out],
             "settings that are wrong": ["gyros", "--board", silent, "--out", tmp_path / "bad.toml"],
         }
-        expect("calibrate", {case: calibrate(*words) for case, words in mistakes.items()}, FOLDER=tmp_path, PORT=silent)
+        expect(
+            "calibrate",
+            {case: echostep("calibrate", *words) for case, words in mistakes.items()},
+            FOLDER=tmp_path,
+            PORT=silent,
+        )
     assert not (tmp_path / "x.toml").exists()
 
 

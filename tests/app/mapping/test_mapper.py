@@ -13,6 +13,7 @@ import pytest
 
 from board_runs import ROOT
 from command_line import echostep
+from echostep.legs.trunk_path import rotated_segment
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep_app.mapping.graph.graph import Closure, contradicted
@@ -129,16 +130,8 @@ def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, 
     for measured in walk.segments:
         s = measured.segment
         turn = math.radians(10.0) * math.hypot(s.dx_m, s.dy_m)
-        c, sn = math.cos(turned), math.sin(turned)
-        moved = replace(s, dx_m=c * s.dx_m - sn * s.dy_m, dy_m=sn * s.dx_m + c * s.dy_m)
-        bent.append(
-            replace(
-                measured,
-                segment=replace(
-                    moved, heading0_rad=s.heading0_rad + turned, heading1_rad=s.heading1_rad + turned + turn
-                ),
-            )
-        )
+        moved = rotated_segment(s, turned)
+        bent.append(replace(measured, segment=replace(moved, heading1_rad=moved.heading1_rad + turn)))
         turned += turn
     assert map_walk(bent).directions.evidence < math.log(1000.0)
 
@@ -146,17 +139,10 @@ def test_walls_at_any_angle_are_no_building_with_two_directions(mapped: Mapped, 
 def test_a_walk_may_begin_out_of_hearing_of_any_wall(walk: SimulatedWalk) -> None:
     """The first 30 m in silence, the walls at 20 degrees to the first heading: the building's directions are those of the walls heard later."""
     turn, way_m, heard = math.radians(20.0), 0.0, []
-    c, sn = math.cos(turn), math.sin(turn)
     for measured in walk.segments:
         s = measured.segment
         way_m += math.hypot(s.dx_m, s.dy_m)
-        moved = replace(
-            s,
-            dx_m=c * s.dx_m - sn * s.dy_m,
-            dy_m=sn * s.dx_m + c * s.dy_m,
-            heading0_rad=s.heading0_rad + turn,
-            heading1_rad=s.heading1_rad + turn,
-        )
+        moved = rotated_segment(s, turn)
         silent = np.full(len(measured.range_m), np.nan)
         heard.append(replace(measured, segment=moved, range_m=silent if way_m < 30.0 else measured.range_m))
     graph = map_walk(heard).graph

@@ -15,6 +15,8 @@ from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.page import TablePage
 from echostep_app.operation.recorded.record import OperationRecorder
 from echostep_app.operation.recorded.tape import MOST_STEPS, STEP_S
+from echostep_app.operation.requests import Action
+from echostep_app.operation.words import ShownEvent
 from echostep_app.page.server import Address
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
@@ -79,6 +81,20 @@ class Team:
         self._inbox.put(topic, payload, False)
         if not self.gathers:
             self.receive()
+
+    def ask(self, request: Action) -> str:
+        """What a page asks for, through the broker and back; the reason of a refusal."""
+        message = self.operation.act(request, self.unix_s, self.now_s)
+        if isinstance(message, str):
+            return message
+        self.put_bytes(*message)
+        return ""
+
+    def details(self, number: int) -> tuple[dict[str, str], tuple[ShownEvent, ...]]:
+        """A wearer's facts by name, and the history."""
+        details = self.operation.details(number, self.now_s)
+        assert details
+        return {fact.name: fact.value for fact in details.facts}, details.history
 
     def receive(self) -> None:
         """Have the operation take what came."""

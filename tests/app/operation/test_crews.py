@@ -29,15 +29,6 @@ LIST = "document.querySelector('#crew-list').innerText"
 DUE = "document.querySelector('#crew-due').textContent"
 
 
-def command(team: Team, request: requests.Action) -> str:
-    """What a page asks for, through the broker and back; the reason of a refusal."""
-    message = team.operation.act(request, team.unix_s, team.now_s)
-    if isinstance(message, str):
-        return message
-    team.put_bytes(*message)
-    return ""
-
-
 def crew_of(team: Team) -> Crew:
     (crew,) = team.scene().crews
     return crew
@@ -46,27 +37,27 @@ def crew_of(team: Team) -> Crew:
 def test_a_crew_enters_answers_and_leaves() -> None:
     team = Team()
     team.hear("Anna", place(TOWER, 7.0, 2.0, 1))
-    assert not command(team, requests.SetCrew("Attack 1", ("Anna", "Bo"), 30.0, "Ann"))
+    assert not team.ask(requests.SetCrew("Attack 1", ("Anna", "Bo"), 30.0, "Ann"))
     identity = crew_of(team).id
-    assert command(team, requests.CrewDoes(identity, "check", "Ann")) == "The crew has done that already."
+    assert team.ask(requests.CrewDoes(identity, "check", "Ann")) == "The crew has done that already."
     for does in ("enter", "check", "leave"):
         team.pass_time(300.0)
-        assert not command(team, requests.CrewDoes(identity, does, "Ben"))
+        assert not team.ask(requests.CrewDoes(identity, does, "Ben"))
         assert crew_of(team).is_inside == (does != "leave")
     crew = crew_of(team)
     assert crew.entered_s is not None
     assert (crew.checked_s, crew.left_s, crew.by) == (crew.entered_s + 300.0, crew.entered_s + 600.0, "Ben")
-    assert "There is no such crew" in command(team, requests.CrewDoes("f" * 8, "check", "Ann"))
+    assert "There is no such crew" in team.ask(requests.CrewDoes("f" * 8, "check", "Ann"))
     assert "crew Attack 1" in team.scene().rows[0].notes
     assert team.scene().crews is team.scene().crews  # a page gets them when they change
 
 
 def test_the_table_at_the_end_is_the_protocol_and_runs_nothing(tmp_path: Path) -> None:
     team = Team()
-    command(team, requests.SetCrew("=1+2", ("Anna", "Bo"), 30.0, "Ann"))
+    team.ask(requests.SetCrew("=1+2", ("Anna", "Bo"), 30.0, "Ann"))
     for does in ("enter", "check", "leave", "enter"):
         team.pass_time(90.0)
-        command(team, requests.CrewDoes(crew_of(team).id, does, "Ann"))
+        team.ask(requests.CrewDoes(crew_of(team).id, does, "Ann"))
     team.put_bytes(*crew_of(team).message)  # the broker repeats it
     path = tmp_path / "crews.csv"
     team.operation.crew_log.write(path)

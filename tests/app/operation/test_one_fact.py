@@ -69,10 +69,8 @@ def agree(team: Team, wearers: dict[str, Wearer], on_the_way_s: float) -> None:
         row = next(row for row in team.scene().rows if row.name == m.report.name)
         r, silent_s, words = m.at(now_s), m.silent_s(now_s), f"{row.name}: {row.words}"
         p, said = r.last_known, RADIUS.search(row.words)
-        details = team.operation.details(row.id, now_s)
+        facts, _ = team.details(row.id)
         assert p
-        assert details
-        facts = {fact.name: fact.value for fact in details.facts}
         assert row.state == tree[row.name]["state"] == facts["state"] == m.state(now_s).value, words
         claims = said is not None  # one and the same everywhere
         assert claims == ("last known" not in words) == np.isfinite(places[row.id][0]), words

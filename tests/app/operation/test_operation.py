@@ -114,12 +114,10 @@ def test_a_history_says_when_a_state_changed_and_is_bounded() -> None:
     for k in range(2 * MOST_EVENTS):
         team.pass_time(1.0)
         team.hear("Kim", place(TOWER, 1.0, 2.0, 1), status="lost" if k % 2 else "tracking")
-    details = team.operation.details(number, team.now_s)
-    assert details is not None
-    assert len(details.history) == MOST_EVENTS
-    assert details.history[0].text.startswith("lost: ")
-    assert details.history[0].unix_s == team.unix_s
-    facts = {fact.name: fact.value for fact in details.facts}
+    facts, history = team.details(number)
+    assert len(history) == MOST_EVENTS
+    assert history[0].text.startswith("lost: ")
+    assert history[0].unix_s == team.unix_s
     assert facts["place"] == "not known"
     assert facts["last known"].startswith("last known 0 s ago, ")
     assert not {"floor", "heading", "safe radius"} & set(facts)
@@ -133,8 +131,6 @@ def test_a_fall_and_the_trunks_tilt_are_said_in_words() -> None:
     (row,) = team.scene().rows
     assert row.state == "mayday"
     assert "mayday: fall 14 s ago" in row.notes
-    details = team.operation.details(row.id, team.now_s)
-    assert details is not None
-    facts = {fact.name: fact.value for fact in details.facts}
+    facts, _ = team.details(row.id)
     assert (facts["alarm"], facts["trunk"]) == ("mayday: fall 14 s ago", "lying (86°)")
     assert [tilt_words(deg) for deg in (4.0, 40.0)] == ["upright (4°)", "bent (40°)"]

@@ -39,19 +39,13 @@ from waiting import until
 TEXT = "document.querySelector('#everybody-text').textContent"
 
 
-def carry_out(team: Team, request: SetOrder | WriteNote) -> None:
-    message = team.operation.act(request, team.unix_s, team.now_s)
-    assert isinstance(message, tuple)
-    team.put_bytes(*message)
-
-
 def row(team: Team, name: str) -> Any:
     return next(row for row in team.scene().rows if row.name == name)
 
 
 def test_who_has_understood_is_counted_and_stands_in_the_history() -> None:
     team = whole_team()
-    carry_out(team, SetOrder("Ann"))
+    assert not team.ask(SetOrder("Ann"))
     order = team.scene().order
     assert order
     assert (order.text, order.by, order.understood, order.of) == (OUT, "Ann", 0, 8)
@@ -63,19 +57,17 @@ def test_who_has_understood_is_counted_and_stands_in_the_history() -> None:
     team.pass_time(1.0)
     assert row(team, "Kim").notes[0] == f"understood: {OUT}"
     assert row(team, "Bo").notes[0] == f"not understood yet: {OUT}"
-    carry_out(team, SetOrder("Ben"))  # once more, with the clock of another commander: all are asked anew
+    assert not team.ask(SetOrder("Ben"))  # once more, with the clock of another commander: all are asked anew
     again = team.scene().order
     assert again
     assert (again.by, again.understood) == ("Ben", 0)
     bo = row(team, "Bo").id
-    carry_out(team, SetOrder("Ben", to=bo, text="Come to stairs B"))
-    carry_out(team, SetOrder("Ben", ended=True))
+    assert not team.ask(SetOrder("Ben", to=bo, text="Come to stairs B"))
+    assert not team.ask(SetOrder("Ben", ended=True))
     assert team.scene().order is None
     team.pass_time(1.0)
     assert row(team, "Bo").notes[0] == "not understood yet: Come to stairs B"
-    details = team.operation.details(bo, team.now_s)
-    assert details
-    said = [event.text for event in details.history]
+    said = [event.text for event in team.details(bo)[1]]
     assert said[:4] == ["everybody out: ended", "Ben: Come to stairs B", f"Ben: {OUT}", f"Ann: {OUT}"]
     copied = team.operation.copy()
     assert set(copied.shared) == set(team.operation.shared)
@@ -83,7 +75,7 @@ def test_who_has_understood_is_counted_and_stands_in_the_history() -> None:
 
 def test_a_note_stays_in_the_log_and_in_the_table_at_the_end(tmp_path: Path) -> None:
     team, path = Team(), tmp_path / "crews.csv"
-    carry_out(team, WriteNote("stairs B are closed", "Ann"))
+    assert not team.ask(WriteNote("stairs B are closed", "Ann"))
     ((identity, note),) = team.operation._board.log.items()
     topic, payload = note_message(identity, note)
     for other in (b"", payload, note_message(identity, Order(1, "nothing", "Ben", note.unix_s + 1.0))[1]):
@@ -196,7 +188,7 @@ def test_an_order_is_over_when_all_are_out() -> None:
         team.hear(name, place(TOWER, 1.0, 1.0, 0))
     end("Bo")
     team.pass_time(10.0)
-    carry_out(team, SetOrder("Ann"))
+    assert not team.ask(SetOrder("Ann"))
     team.pass_time(10.0)
     team.hear("Kim", place(TOWER, 1.0, 1.0, 0), alarm=ReportedAlarm("mayday", "help", 1, 0.0))
     end("Kim")

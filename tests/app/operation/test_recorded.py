@@ -8,7 +8,6 @@ import random
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 
 from board_runs import ROOT
@@ -17,7 +16,7 @@ from echostep.errors import EchostepError
 from echostep.recording import open_recording
 from echostep_app.operation.operation import Operation, TableScene
 from echostep_app.operation.recorded import tape
-from echostep_app.operation.recorded.record import Heard, decode_record
+from echostep_app.operation.recorded.record import decode_record
 from echostep_app.operation.recorded.tape import OperationTape, Reader, TapeHead
 from echostep_app.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
@@ -32,6 +31,13 @@ def read(path: Path) -> tuple[Reader, OperationTape]:
     made = OperationTape(path, Operation(TOWER))
     *_, reader = made.read()
     return reader, made
+
+
+def whole_recording(folder: Path) -> Path:
+    team = Team()
+    made = Recording(folder, team)
+    whole_team(team)
+    return made.close()
 
 
 def seen(scene: TableScene) -> tuple[Any, ...]:
@@ -102,10 +108,7 @@ def test_rejected_messages_are_counted_and_do_not_fill_the_disk(tmp_path: Path) 
 
 
 def test_a_file_cut_off_anywhere_shows_what_came_before(tmp_path: Path) -> None:
-    team = Team()
-    made = Recording(tmp_path, team)
-    whole_team(team)
-    whole = made.close().read_bytes()
+    whole = whole_recording(tmp_path).read_bytes()
     rng = random.Random(3)
     for k in range(6):
         path = tmp_path / f"cut{k}.mcap"
@@ -117,10 +120,7 @@ def test_a_file_cut_off_anywhere_shows_what_came_before(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_damaged_bytes_end_in_no_other_error(tmp_path: Path) -> None:
-    team = Team()
-    made = Recording(tmp_path, team)
-    whole_team(team)
-    whole = made.close().read_bytes()
+    whole = whole_recording(tmp_path).read_bytes()
     rng = random.Random(4)
     for k in range(20):
         damaged = bytearray(whole)
@@ -142,10 +142,7 @@ def test_what_is_no_record_is_none(data: bytes) -> None:
 
 
 def test_the_command_shows_a_recorded_operation_and_names_what_is_none(tmp_path: Path) -> None:
-    team = Team()
-    made = Recording(tmp_path, team)
-    whole_team(team)
-    path = made.close()
+    path = whole_recording(tmp_path)
     run = echostep("command", path, "--plan", PLAN, "--no-page", "--json")
     assert {m["name"] for m in json.loads(run.stdout)["members"]} >= {"Kim", "Finn"}
     assert "another plan" in run.stderr
@@ -154,8 +151,3 @@ def test_the_command_shows_a_recorded_operation_and_names_what_is_none(tmp_path:
     for wrong, why in ((junk, "no recorded bytes"), (CAPTURES / "walk.mcap", "no recorded operation")):
         failed = echostep("command", wrong, "--plan", PLAN, "--no-page")
         assert (failed.returncode, why in failed.stderr) == (2, True)
-
-
-def test_heard_holds_the_payload_as_it_came() -> None:
-    record = Heard(1.0, True, "echostep/red/Kim/estimate", b"{\x00}")
-    assert decode_record(msgspec.msgpack.encode(record)) == record

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,17 +28,11 @@ from walks import DEMO as PLAN
 from xsens.mt_lines import SAMPLE, STEP_S, Line, on_a_terminal
 
 
-def device(state: DeviceState, output: OutputFormat) -> MtxDevice:
-    made = MtxDevice(output)
-    made.state = state
-    made.period, made.skip = 2304, 3
-    return made
-
-
 @pytest.mark.parametrize("state", list(DeviceState))
 @pytest.mark.parametrize("output", [FACTORY, PROJECT, OutputFormat(0x4000, 0), OutputFormat(0x0007, 0x0101)])
 def test_from_any_state_to_the_projects_mode(state: DeviceState, output: OutputFormat) -> None:
-    made = device(state, output)
+    made = MtxDevice(output)
+    made.state, made.period, made.skip = state, 2304, 3
     line = Line(made)
     assert line.run(1.5).state is State.CONFIGURED, line.setup.verdict
     assert (made.output, made.rate_hz, made.pulses) == (PROJECT, 100.0, True)
@@ -48,23 +43,14 @@ def test_from_any_state_to_the_projects_mode(state: DeviceState, output: OutputF
 
 
 def test_a_device_that_just_woke_is_caught_within_its_half_second() -> None:
+    """At first, and again later."""
     made = MtxDevice()
     line = Line(made)
-    line._to_host = made.power_on(line.now_s)
-    line.run(0.4)
-    assert line.setup.state is State.CONFIGURED
-    assert line.setup.wake_ups == 1
-
-
-def test_a_device_that_wakes_up_later_is_set_up_again() -> None:
-    made = MtxDevice()
-    line = Line(made)
-    assert line.run(1.0).state is State.CONFIGURED
-    made.output = FACTORY
-    line._to_host = made.power_on(line.now_s)
-    line.run(1.0)
-    assert line.setup.state is State.CONFIGURED
-    assert made.output == PROJECT
+    for wake_ups in (1, 2):
+        made.output = FACTORY
+        line._to_host = made.power_on(line.now_s)
+        assert line.run(0.4).state is State.CONFIGURED
+        assert (line.setup.wake_ups, made.output) == (wake_ups, PROJECT)
 
 
 @pytest.mark.slow
@@ -105,10 +91,6 @@ def test_silence_ends_after_its_tries_and_is_said() -> None:
     assert "silent" in setup.verdict
 
 
-def mtdata2(*packets: bytes) -> bytes:
-    return encode_frame(0x36, b"".join(packets))
-
-
 def packet(identifier: int, layout: str, *values: float) -> bytes:
     return struct.pack(">HB", identifier, struct.calcsize(">" + layout)) + struct.pack(">" + layout, *values)
 
@@ -124,7 +106,7 @@ def mti(outputs: str, seconds: float, answers_s: float = 1e9) -> MtxSetup:
     """A setup that hears so many seconds of an MTi, which answers the first request after `answers_s`."""
     setup, asked = MtxSetup(project_requests(100.0), 100.0), False
     for k in range(round(seconds / STEP_S)):
-        received = mtdata2(packet(0x1020, "H", k & 0xFFFF), *OUTPUTS[outputs])
+        received = encode_frame(0x36, b"".join([packet(0x1020, "H", k & 0xFFFF), *OUTPUTS[outputs]]))
         if asked and k * STEP_S >= answers_s:
             received += encode_frame(0x31)
             answers_s = 1e9
@@ -191,16 +173,6 @@ class Stubborn(MtxDevice):
         return b"" if mid == 0xD0 and payload else super()._set_or_tell(mid, payload)
 
 
-class Successor(MtxDevice):
-    """An MTi 100: knows SetOutputConfiguration instead."""
-
-    def _answer(self, mid: int, payload: bytes) -> bytes:
-        if mid == 0xC0 and self.state is DeviceState.CONFIG:
-            self.configuration = payload
-            return encode_frame(0xC1, payload)
-        return encode_frame(0x42, b"\x04") if mid in (0x04, 0xD0, 0xD2, 0xD4) else super()._answer(mid, payload)
-
-
 def test_a_device_that_answers_too_late_is_told_from_a_deaf_one() -> None:
     """It answers each request after 1.2 s: the line works, and what to do is said."""
     setup, reader, answers = MtxSetup(project_requests(100.0), 100.0), FrameReader(), list[tuple[float, bytes]]()
@@ -225,13 +197,6 @@ def test_a_mode_that_was_not_taken_is_noticed() -> None:
     assert line.run(1.5).state is State.WRONG_MODE
     assert "ReqOutputMode" in line.setup.verdict
     assert line.device.state is DeviceState.MEASURING
-
-
-def test_a_successor_gets_its_own_configuration() -> None:
-    made = Successor()
-    setup = Line(made).run(1.5)
-    assert setup.state is State.CONFIGURED
-    assert made.configuration == bytes.fromhex("1020FFFF2010006440200064802000 64C0200064".replace(" ", ""))
 
 
 @pytest.mark.parametrize(
@@ -293,23 +258,15 @@ def test_record_sets_the_device_up_and_keeps_every_byte(
     assert bytes.fromhex("faff3100d0") in stream  # the acknowledgements are in the recording, too
 
 
+def live(board: str, mtx: str, out: Path, *more: object) -> subprocess.CompletedProcess[str]:
+    ports = ("--board", board, "--mtx", mtx)
+    return echostep("live", "--plan", PLAN, *ports, "--out", out, "--headless", *more)
+
+
 @pytest.mark.slow
 def test_live_stops_at_a_device_that_is_set_wrongly_and_does_not_listen(tmp_path: Path) -> None:
     with on_a_terminal(MtxDevice(FACTORY, deaf=True)) as mtx, mute_port() as board:
-        done = echostep(
-            "live",
-            "--plan",
-            PLAN,
-            "--board",
-            board,
-            "--mtx",
-            mtx,
-            "--out",
-            tmp_path,
-            "--headless",
-            "--seconds",
-            PATIENCE_S,
-        )
+        done = live(board, mtx, tmp_path, "--seconds", PATIENCE_S)
     assert done.returncode == 2
     assert "MTData of 18 bytes instead of 54" in done.stderr
     assert "MT Manager" in done.stderr
@@ -332,8 +289,6 @@ def test_record_goes_on_with_a_device_that_is_right_or_silent(
 def test_a_rate_that_the_device_cannot_have_is_named(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("[mtx]\nrate_hz = 99.9\n")
     with mute_port() as mtx, mute_port() as board:
-        done = echostep(
-            "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--out", tmp_path, "--settings", tmp_path / "s.toml", "--headless"
-        )  # fmt: skip
+        done = live(board, mtx, tmp_path, "--settings", tmp_path / "s.toml")
     assert done.returncode == 2
     assert "rate_hz" in done.stderr

@@ -49,6 +49,7 @@ def test_a_rate_that_it_cannot_have_is_said() -> None:
 )
 def test_the_answer_is_compared_with_what_is_needed(answer: tuple[tuple[int, int], ...], fault: str) -> None:
     request = successor_requests(100.0)[0]
+    assert request.payload.hex(" ", 4) == "1020ffff 20100064 40200064 80200064 c0200064"
     assert request.fault(b"".join(struct.pack(">HH", *output) for output in answer)) == fault
     assert request.fault(b"\xff" * 7)  # nonsense is a fault, not an exception
 

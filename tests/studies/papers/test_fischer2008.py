@@ -106,12 +106,6 @@ def test_the_product_is_of_the_two_norms() -> None:
     assert fischer2008.product(np.array([[3.0, 0.0, 4.0]]), np.array([[0.0, 2.0, 0.0]])) == pytest.approx([10.0])
 
 
-def test_the_matrix_turns_the_accelerations_into_the_world_and_gravity_is_taken_away() -> None:
-    matrix = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
-    found = fischer2008.world_acceleration(matrix, np.array([[1.0, 2.0, 12.81]]))
-    assert found[0] == pytest.approx([-2.0, 1.0, 3.0])
-
-
 @pytest.mark.parametrize(("length_s", "known"), [(0.20, False), (0.22, True)])
 def test_a_stance_takes_more_than_a_fifth_of_a_second(length_s: float, known: bool) -> None:
     t = np.arange(100) / 100.0

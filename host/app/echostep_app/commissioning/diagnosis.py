@@ -57,40 +57,45 @@ class Diagnosis:
         """Whether all findings are notes."""
         return all(finding.severity is Severity.NOTE for finding in self.findings)
 
+    def add(self, severity: Severity, subject: str, what: str, remedy: str) -> None:
+        """Add a finding."""
+        self.findings.append(Finding(severity, subject, what, remedy))
+
 
 def judge_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the board at this port."""
-    reports = probed.reports
-    report.probed["board"] = probed
-    finding = stale_firmware(probed, port, "board") or silence(probed, port, "board")
-    if finding is not None or reports.identity is None:
-        report.findings += [finding] if finding else []
+    identity = identify(report, probed, port, "board")
+    if identity is None:
         return
-    report.lines += board_lines("board", probed, port) + _device_lines(probed) + _rate_lines(probed)
+    report.lines += _device_lines(probed) + _rate_lines(probed)
     electrical_diagnosis(report, probed, "board")
     loop_diagnosis(report, probed, "board")
-    report.findings += board_findings(reports) + _stream_findings(probed) + _version_findings(reports.identity, port)
+    report.findings += board_findings(probed.reports)
+    _judge_streams(report, probed)
+    if not knows_subscriptions(identity):
+        what = "its firmware is older than 1.2: it reports neither its supply voltage nor its crashes"
+        report.add(Severity.NOTE, "board", what, f"flash it: echostep flash --port {port}")
     if probed.rates_hz:
-        report.findings += rate_findings(reports, probed.rates_hz)
+        report.findings += rate_findings(probed.reports, probed.rates_hz)
     else:
-        what, remedy = "has just started: its rates are not known yet", "run echostep doctor again"
-        report.findings.append(Finding(Severity.NOTE, "board", what, remedy))
+        report.add(Severity.NOTE, "board", "has just started: its rates are not known yet", "run echostep doctor again")
     clock_diagnosis(report, probed, "board")
 
 
-def stale_firmware(probed: ProbeResult, port: str, subject: str) -> Finding | None:
-    """A finding on a board whose firmware does not fit."""
-    what, _, _ = probed.stale_firmware.partition(";")
-    return Finding(Severity.FAULT, subject, what, f"flash it: echostep flash --port {port}") if what else None
-
-
-def board_lines(subject: str, probed: ProbeResult, port: str) -> list[str]:
-    """Firmware and supply of a board."""
+def identify(report: Diagnosis, probed: ProbeResult, port: str, subject: str) -> Identity | None:
+    """Add firmware and supply of a board; None, with a finding, when its firmware does not fit or it has not answered."""
+    report.probed[subject] = probed
     i = probed.reports.identity
+    if probed.stale_firmware:
+        what, _, _ = probed.stale_firmware.partition(";")
+        report.add(Severity.FAULT, subject, what, f"flash it: echostep flash --port {port}")
+        return None
     if i is None:
-        return []
+        _judge_silence(report, probed, port, subject)
+        return None
     version = f"firmware {i.version_major}.{i.version_minor}.{i.version_patch}, schema 0x{SCHEMA_HASH:08X} as this host"
-    return [f"{subject:10}{' ' * (len(subject) > 9)}{port}: {version}", *_supply_lines(probed.reports)]
+    report.lines += [f"{subject:10}{' ' * (len(subject) > 9)}{port}: {version}", *_supply_lines(probed.reports)]
+    return i
 
 
 def clock_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
@@ -99,11 +104,12 @@ def clock_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> Non
     if drift is None and probed.replies:
         report.lines.append("clock     too few answers for its rate")
     elif drift is None:
-        what, remedy = "answers no clock queries", "it receives nothing: unplug it and plug it in again"
-        report.findings.append(Finding(Severity.FAULT, subject, what, remedy))
+        remedy = "it receives nothing: unplug it and plug it in again"
+        report.add(Severity.FAULT, subject, "answers no clock queries", remedy)
     else:
-        report.lines.append(f"clock     {describe(drift)}")
-        report.findings += _clock_findings(drift, subject)
+        off = f"the board's is {drift.low_ppm:+.0f} to {drift.high_ppm:+.0f} ppm off this computer's"
+        report.lines.append(f"clock     {off}; it answers in {1e3 * drift.answer_s:.1f} ms")
+        _judge_clock(report, drift, subject)
 
 
 def electrical_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
@@ -115,7 +121,7 @@ def electrical_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -
         report.findings += electrical_findings(probed.reports)
         return
     what = f"reports no levels: its firmware is older than {'.'.join(map(str, FIRST_LEVELS))}"
-    report.findings.append(Finding(Severity.WARNING, subject, what, "flash it: echostep flash"))
+    report.add(Severity.WARNING, subject, what, "flash it: echostep flash")
 
 
 def loop_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None:
@@ -130,7 +136,7 @@ def loop_diagnosis(report: Diagnosis, probed: ProbeResult, subject: str) -> None
         what = (
             f"is too slow: a turn of its main loop takes {turn_ms:.1f} ms, an interrupt waits for {latency_us:.0f} us"
         )
-        report.findings.append(Finding(Severity.WARNING, subject, what, "send this line in, with the parts plugged in"))
+        report.add(Severity.WARNING, subject, what, "send this line in, with the parts plugged in")
 
 
 def _supply_lines(reports: BoardReports) -> list[str]:
@@ -143,26 +149,14 @@ def _supply_lines(reports: BoardReports) -> list[str]:
     return [f"supply    {voltage}; {starts}{crashes}"]
 
 
-def _version_findings(identity: Identity, port: str) -> list[Finding]:
-    if knows_subscriptions(identity):
-        return []
-    what = "its firmware is older than 1.2: it reports neither its supply voltage nor its crashes"
-    return [Finding(Severity.NOTE, "board", what, f"flash it: echostep flash --port {port}")]
-
-
-def silence(probed: ProbeResult, port: str, subject: str) -> Finding | None:
-    """A finding on a board that has not answered the request for its identity."""
-    if probed.reports.identity is not None:
-        return None
-    if not probed.bytes_of[BOARD]:
-        what, remedy = (
-            f"{port} is silent",
-            "check that this is the board's port; unplug it and plug it in again, or flash it: echostep flash",
-        )
-    else:
+def _judge_silence(report: Diagnosis, probed: ProbeResult, port: str, subject: str) -> None:
+    """Add a finding on a board that has not answered the request for its identity."""
+    what = f"{port} is silent"
+    remedy = "check that this is the board's port; unplug it and plug it in again, or flash it: echostep flash"
+    if probed.bytes_of[BOARD]:
         what = f"{probed.bytes_of[BOARD]} bytes came from {port}, but no valid frame of the board"
         remedy = "name the board's port with --board, or flash it: echostep flash"
-    return Finding(Severity.FAULT, subject, what, remedy)
+    report.add(Severity.FAULT, subject, what, remedy)
 
 
 def _device_lines(probed: ProbeResult) -> list[str]:
@@ -187,18 +181,15 @@ def _rate_lines(probed: ProbeResult) -> list[str]:
     return [f"rates     {', '.join(parts)}", f"frames    {probed.lost} lost, {probed.rejected} damaged"]
 
 
-def _stream_findings(probed: ProbeResult) -> list[Finding]:
-    findings = []
+def _judge_streams(report: Diagnosis, probed: ProbeResult) -> None:
     if probed.lost or probed.rejected > 1:  # opening the port may cut one frame
         what = f"{probed.lost} frames were lost and {probed.rejected} damaged on the way"
-        findings.append(
-            Finding(Severity.WARNING, "board", what, "a bad cable or hub, or another program reads the port")
-        )
-    return findings + _gyro_findings(probed) + _echo_findings(probed)
+        report.add(Severity.WARNING, "board", what, "a bad cable or hub, or another program reads the port")
+    _judge_gyros(report, probed)
+    report.findings += _echo_findings(probed)
 
 
-def _gyro_findings(probed: ProbeResult) -> list[Finding]:
-    findings = []
+def _judge_gyros(report: Diagnosis, probed: ProbeResult) -> None:
     for device in SELECTS:
         rates = [v for g in probed.gyros if (v := getattr(g, (device.name or "").lower())) != GYROS_INVALID]
         last = rates[-CONSTANT_SAMPLES:]
@@ -207,11 +198,10 @@ def _gyro_findings(probed: ProbeResult) -> list[Finding]:
         is_constant = len(last) == CONSTANT_SAMPLES and len(set(last)) == 1
         if is_constant and not six_axes:  # at rest the noise of an LSM6DSO is a fifth of a count of `gyros`
             what = f"gives a constant {last[0]} counts, without noise"
-            findings.append(Finding(Severity.WARNING, NAMES[device], what, "it may be stuck: power-cycle the board"))
+            report.add(Severity.WARNING, NAMES[device], what, "it may be stuck: power-cycle the board")
         elif last and sum(abs(v) >= full_scale for v in last) > len(last) // 2:
             what = f"is at full scale, {scale} degrees/s"
-            findings.append(Finding(Severity.FAULT, NAMES[device], what, "if nothing turns: replace it"))
-    return findings
+            report.add(Severity.FAULT, NAMES[device], what, "if nothing turns: replace it")
 
 
 def _echo_findings(probed: ProbeResult) -> list[Finding]:
@@ -225,24 +215,14 @@ def _echo_findings(probed: ProbeResult) -> list[Finding]:
     return findings
 
 
-def describe(drift: Drift) -> str:
-    """The clock's drift and answer time as text."""
-    return (
-        f"the board's is {drift.low_ppm:+.0f} to {drift.high_ppm:+.0f} ppm off this computer's; "
-        f"it answers in {1e3 * drift.answer_s:.1f} ms"
-    )
-
-
-def _clock_findings(drift: Drift, subject: str) -> list[Finding]:
-    findings = []
+def _judge_clock(report: Diagnosis, drift: Drift, subject: str) -> None:
     if drift.least_ppm > DRIFT_MAX_PPM:
         what = f"its clock is off by at least {drift.least_ppm:.0f} ppm"
         remedy = "times stay consistent, speeds are wrong by the same factor; use a board with a 16 MHz crystal"
-        findings.append(Finding(Severity.WARNING, subject, what, remedy))
+        report.add(Severity.WARNING, subject, what, remedy)
     if drift.answer_s > ANSWER_MAX_S:
         what = f"it answers only after {1e3 * drift.answer_s:.0f} ms"
-        findings.append(Finding(Severity.WARNING, subject, what, "this computer is busy, or a USB hub is in between"))
-    return findings
+        report.add(Severity.WARNING, subject, what, "this computer is busy, or a USB hub is in between")
 
 
 def _mtx_fault(probed: ProbeResult) -> str:
@@ -261,22 +241,16 @@ def judge_mtx(report: Diagnosis, probed: ProbeResult, *, with_board: bool) -> No
     rate_hz, wanted_hz = probed.mtx_hz, MtxTiming().rate_hz
     if probed.mtx_fault or not probed.bytes_of[MTX] or math.isnan(rate_hz):
         what, _, remedy = _mtx_fault(probed).removeprefix("MTx: ").partition(": ")
-        report.findings.append(
-            Finding(Severity.FAULT, "MTx", what, remedy or "check its supply, its cable and the port")
-        )
+        report.add(Severity.FAULT, "MTx", what, remedy or "check its supply, its cable and the port")
         return
     report.lines.append(f"MTx       {rate_hz:.1f} samples/s")
     if abs(rate_hz / wanted_hz - 1.0) > MTX_RATE_ERROR:
         what = f"{rate_hz:.1f} samples/s, expected are {wanted_hz:g}"
-        report.findings.append(Finding(Severity.WARNING, "MTx", what, "samples are lost: check its cable"))
+        report.add(Severity.WARNING, "MTx", what, "samples are lost: check its cable")
     force_g = force_range_g(probed.mtx_product)
     if force_g is not None and force_g < HURRIED_G:
         what = f"{probed.mtx_product} measures up to {force_g:g} g; hurried feet exceed that"
-        report.findings.append(
-            Finding(Severity.NOTE, "MTx", what, "walk calmly, or wear an MTx of 18 g or a foot board")
-        )
+        report.add(Severity.NOTE, "MTx", what, "walk calmly, or wear an MTx of 18 g or a foot board")
     if with_board and not probed.ticks.get("Sync"):
         what = "no SyncOut pulse reaches the board: its samples are timed by their arrival, to a millisecond"
-        report.findings.append(
-            Finding(Severity.NOTE, "MTx", what, "wire its SyncOut to D4 through the buffer (firmware/README.md)")
-        )
+        report.add(Severity.NOTE, "MTx", what, "wire its SyncOut to D4 through the buffer (firmware/README.md)")

@@ -12,7 +12,7 @@ from rich.text import Text
 from echostep.board.messages import Schedule
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
-from echostep_app.board.faults.health import Finding, Severity
+from echostep_app.board.faults.health import Severity
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep_app.commissioning.foot_diagnosis import judge_foot_board
 from echostep_app.commissioning.probe import probe
@@ -67,11 +67,11 @@ def examine(
     ports = {BOARD: board, MTX: mtx or find(seen, Role.MTX, MTX_NAME), FOOT: foot}
     usable = {name: port for name, port in ports.items() if port is not None and _usable(report, name, port)}
     if ports[BOARD] is None:
-        report.findings.append(_no_board(seen))
+        _judge_no_board(report, seen)
     if ports[MTX] is None and foot is None:
         what = "neither an MTx nor a foot board is plugged in: only the legs can be tracked"
-        report.findings.append(Finding(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot"))
-    report.findings += _several_boards(seen, board, foot)
+        report.add(Severity.NOTE, "MTx", what, "plug it in, or name its port with --mtx or --foot")
+    _judge_several_boards(report, seen, board, foot)
     at_ankle = usable.pop(FOOT, None)
     if usable:
         _probe_devices(report, usable, seconds, schedule)
@@ -91,23 +91,24 @@ def _usable(report: Diagnosis, name: str, port: str) -> bool:
     return not no_access
 
 
-def _no_board(seen: list[PortSeen]) -> Finding:
+def _judge_no_board(report: Diagnosis, seen: list[PortSeen]) -> None:
     blank = next((port for port in seen if port.role in (Role.BOOTLOADER, Role.SKETCH)), None)
-    if blank is not None:
-        what = f"{blank.path} is a {blank.role.value}"
-        return Finding(Severity.FAULT, "board", what, f"write the firmware: echostep flash --port {blank.path}")
     what = "no sensor board is plugged in" if seen else "no sensor board is plugged in, and no other serial port"
     remedy = "plug it in with a USB cable that carries data, not only power; or name its port with --board"
-    return Finding(Severity.FAULT, "board", what, remedy)
+    if blank is not None:
+        what, remedy = (
+            f"{blank.path} is a {blank.role.value}",
+            f"write the firmware: echostep flash --port {blank.path}",
+        )
+    report.add(Severity.FAULT, "board", what, remedy)
 
 
-def _several_boards(seen: list[PortSeen], *chosen: str | None) -> list[Finding]:
+def _judge_several_boards(report: Diagnosis, seen: list[PortSeen], *chosen: str | None) -> None:
     boards = [port.name for port in seen if port.role is Role.BOARD]
     examined = [path for path in chosen if path is not None]
-    if len(boards) <= max(len(examined), 1):
-        return []
-    what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {' and '.join(examined)}"
-    return [Finding(Severity.NOTE, "board", what, "name the other one with --board")]
+    if len(boards) > max(len(examined), 1):
+        what = f"{len(boards)} boards are plugged in ({'; '.join(boards)}); this report is on {' and '.join(examined)}"
+        report.add(Severity.NOTE, "board", what, "name the other one with --board")
 
 
 def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, schedule: Schedule | None) -> None:
@@ -115,14 +116,14 @@ def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, sch
         probed = probe(ports, seconds, check_gyros=True, schedule=schedule)
     except EchostepError as error:
         what, _, remedy = str(error).partition("; ")
-        report.findings.append(Finding(Severity.FAULT, "ports", what, remedy or "unplug it and plug it in again"))
+        report.add(Severity.FAULT, "ports", what, remedy or "unplug it and plug it in again")
         return
     for notice in probed.notices:
-        report.findings.append(Finding(Severity.WARNING, "ports", notice, "check the cable and its plugs"))
+        report.add(Severity.WARNING, "ports", notice, "check the cable and its plugs")
     devices = {name: sender(probed.first_bytes.get(name, b"")) for name in ports}
     if wrong := [(name, device) for name, device in devices.items() if device is not None and device != name]:
         what, _, remedy = wrong_device(*wrong[0], ports).partition(": ")
-        report.findings.append(Finding(Severity.FAULT, "ports", what, remedy))
+        report.add(Severity.FAULT, "ports", what, remedy)
         return
     if BOARD in ports:
         judge_board(report, probed, ports[BOARD])
@@ -134,10 +135,10 @@ def _probe_foot_board(report: Diagnosis, port: str, seconds: float) -> None:
     try:
         probed = probe({BOARD: port}, seconds)
     except EchostepError as error:
-        report.findings.append(Finding(Severity.FAULT, "foot board", str(error), "unplug it and plug it in again"))
+        report.add(Severity.FAULT, "foot board", str(error), "unplug it and plug it in again")
         return
     for notice in probed.notices:
-        report.findings.append(Finding(Severity.WARNING, "foot board", notice, "check the cable and its plugs"))
+        report.add(Severity.WARNING, "foot board", notice, "check the cable and its plugs")
     judge_foot_board(report, probed, port)
 
 

@@ -166,7 +166,7 @@ def fit_compass(probed: ProbeResult, settings: Settings) -> Fit:
     """Hard- and soft-iron errors of the compass, from a turn on the spot."""
     t_s, belt, bearing_s, bearing = _turn(probed, settings)
     heading = np.full(len(t_s), np.nan)
-    heading[np.clip(np.searchsorted(t_s, bearing_s), 0, len(t_s) - 1)] = compass_heading(bearing)
+    heading[np.clip(np.searchsorted(t_s, bearing_s), 0, len(t_s) - 1)] = 0.5 * math.pi - bearing
     try:
         iron = fit_compass_errors(t_s, belt, heading)
     except ValueError as error:
@@ -261,8 +261,3 @@ def _robust_least_squares(columns: Floats, values: Floats) -> tuple[Floats, Floa
         spread = max(MAD_TO_SD * float(np.median(np.abs(residuals))), SMALLEST_SPREAD_RAD)
         weight = np.minimum(1.0, 2.0 * spread / np.maximum(np.abs(residuals), 1e-9)) ** 0.5
     return solution, residuals
-
-
-def compass_heading(bearing_rad: Floats) -> Floats:
-    """Headings (rad) counter-clockwise from the map's x (east), of bearings clockwise from north."""
-    return 0.5 * math.pi - bearing_rad

@@ -11,16 +11,14 @@ import numpy as np
 from echostep.board.calibration import ICM20649_M_S2, ICM20649_RAD_S
 from echostep.board.messages import FOOT_HEALTH_TEMPERATURE_INVALID, FootState, Part
 from echostep_app.board.faults.device_faults import foot_celsius
-from echostep_app.board.faults.findings import PART_NAMES, Finding, Severity
+from echostep_app.board.faults.findings import PART_NAMES, Severity
 from echostep_app.board.faults.health import board_findings
 from echostep_app.commissioning.diagnosis import (
     Diagnosis,
-    board_lines,
     clock_diagnosis,
     electrical_diagnosis,
+    identify,
     loop_diagnosis,
-    silence,
-    stale_firmware,
 )
 from echostep_app.commissioning.probe import ProbeResult
 
@@ -34,25 +32,28 @@ LEAST_SAMPLES = 100
 def judge_foot_board(report: Diagnosis, probed: ProbeResult, port: str) -> None:
     """Add facts and findings on the foot board at this port."""
     subject, reports = "foot board", probed.reports
-    report.probed[subject] = probed
-    finding = stale_firmware(probed, port, subject) or silence(probed, port, subject)
-    if finding is not None:
-        report.findings.append(finding)
+    if identify(report, probed, port, subject) is None:
         return
-    report.lines += board_lines(subject, probed, port)
     electrical_diagnosis(report, probed, subject)
     loop_diagnosis(report, probed, subject)
     if reports.foot is None:
-        report.findings.append(_no_part(probed))
+        what = "has found no ICM-20649"
+        if reports.parts is not None and reports.parts.identity_foot:
+            what += f": its identity register reads 0x{reports.parts.identity_foot:02X} instead of 0xE1"
+        remedy = "check its 5 V and ground, the SPI wires and its chip select (D8)"
+        report.add(Severity.FAULT, subject, what, remedy)
         return
     c, state = reports.foot.temperature, FootState(reports.foot.foot_state).name.lower()
     warm = "" if c == FOOT_HEALTH_TEMPERATURE_INVALID else f", {foot_celsius(c):.0f} degC"
-    report.lines.append(f"{'foot':10}{PART_NAMES[Part.ICM20649]}, identity 0xE1, {state}{warm}{_rest_text(probed)}")
+    rest = _rest(probed)
+    at_rest = "" if rest is None else f"; at rest {rest[0]:.2f} m/s2, {rest[1]:.1f} deg/s"
+    report.lines.append(f"{'foot':10}{PART_NAMES[Part.ICM20649]}, identity 0xE1, {state}{warm}{at_rest}")
     rate_hz = probed.rates_hz.get("Foot", 0.0)
     report.lines.append(
         f"{'rates':10}foot {rate_hz:.1f}/s; {probed.lost} frames lost, {reports.foot.missed} samples missed"
     )
-    report.findings += board_findings(reports) + _sample_findings(probed, rate_hz)
+    report.findings += board_findings(reports)
+    _judge_samples(report, probed, rate_hz)
     clock_diagnosis(report, probed, subject)
 
 
@@ -65,37 +66,17 @@ def _rest(probed: ProbeResult) -> tuple[float, float] | None:
     return float(ICM20649_M_S2 * np.median(forces)), float(np.degrees(ICM20649_RAD_S * np.median(rates)))
 
 
-def _rest_text(probed: ProbeResult) -> str:
-    rest = _rest(probed)
-    return "" if rest is None else f"; at rest {rest[0]:.2f} m/s2, {rest[1]:.1f} deg/s"
-
-
-def _no_part(probed: ProbeResult) -> Finding:
-    parts = probed.reports.parts
-    identity = 0 if parts is None else parts.identity_foot
-    what = "has found no ICM-20649"
-    if identity:
-        what += f": its identity register reads 0x{identity:02X} instead of 0xE1"
-    return Finding(
-        Severity.FAULT, "foot board", what, "check its 5 V and ground, the SPI wires and its chip select (D8)"
-    )
-
-
-def _sample_findings(probed: ProbeResult, rate_hz: float) -> list[Finding]:
-    """Findings on rate, force and zero rate of a part that runs."""
+def _judge_samples(report: Diagnosis, probed: ProbeResult, rate_hz: float) -> None:
+    """Add findings on rate, force and zero rate of a part that runs."""
     foot, rest = probed.reports.foot, _rest(probed)
-    findings = []
     if foot is None or foot.foot_state != FootState.RUNNING or not probed.rates_hz:
-        return []
+        return
     if abs(rate_hz / RATE_HZ - 1.0) > RATE_ERROR:
         what = f"{rate_hz:.1f} samples/s, expected are {RATE_HZ:g}"
-        findings.append(
-            Finding(Severity.WARNING, "foot board", what, "unplug it and plug it in again; avoid a USB hub")
-        )
+        report.add(Severity.WARNING, "foot board", what, "unplug it and plug it in again; avoid a USB hub")
     if rest and abs(rest[0] - GRAVITY_M_S2) > GRAVITY_ERROR_M_S2:
         what = f"measures {rest[0]:.2f} m/s2 at rest instead of {GRAVITY_M_S2}"
-        findings.append(Finding(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again"))
+        report.add(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again")
     if rest and rest[1] > BIAS_MAX_DEG_S:
         what = f"measures {rest[1]:.1f} deg/s at rest"
-        findings.append(Finding(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again"))
-    return findings
+        report.add(Severity.WARNING, "foot board", what, "stand still and run echostep doctor again")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats
+from echostep.arrays import Bools
 from echostep.path import MeasuredSegment
 from echostep_app.mapping.graph.association import KNOWN_M, associate
 from echostep_app.mapping.graph.bias import find_bias, without_bias
@@ -21,7 +21,7 @@ from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, Directions, fi
 from echostep_app.mapping.graph.fragments import Fragments, find_fragments
 from echostep_app.mapping.graph.graph import ROUNDS, Closure, FittedWalls, Graph, contradicted
 from echostep_app.mapping.graph.levels import BETWEEN, find_levels
-from echostep_app.mapping.graph.nodes import Nodes, Pings, nodes_of
+from echostep_app.mapping.graph.nodes import Nodes, Pings, nodes_of, rotated
 from echostep_app.mapping.graph.spots import with_spots
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings
 from echostep_app.mapping.walls.drawing import Drawing, draw
@@ -82,9 +82,7 @@ def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Gra
     if directions.evidence < LEAST_EVIDENCE:
         return Graph(nodes, fragments, nodes.pose.copy(), none)
     pose, drift = nodes.pose.copy(), directions.drift_rad
-    c, s = np.cos(drift[:-1]), np.sin(drift[:-1])
-    dx, dy = np.diff(nodes.pose[:, :2], axis=0).T
-    pose[1:, :2] = pose[0, :2] + np.cumsum(np.column_stack([c * dx - s * dy, s * dx + c * dy]), axis=0)
+    pose[1:, :2] = pose[0, :2] + np.cumsum(rotated(np.diff(nodes.pose[:, :2], axis=0), drift[:-1]), axis=0)
     pose[:, 2] += drift
     return Graph(nodes, fragments, pose, none, base_rad=directions.base_rad)
 
@@ -99,16 +97,9 @@ def find_walls(graph: Graph) -> None:
 
 def _anchored(graph: Graph) -> Bools:
     """Which fragments are within KNOWN_M of path of an end of a closure."""
-    way_m = graph.nodes.way_m
-    ends_m = (
-        np.sort(way_m[[node for c in graph.closures for node in (c.old, c.new)]]) if graph.closures else np.zeros(0)
-    )
-    if not len(ends_m):
-        return np.zeros(len(graph.fragments.node), np.bool_)
-    at = way_m[graph.fragments.node]
-    k = np.clip(np.searchsorted(ends_m, at), 1, len(ends_m) - 1) if len(ends_m) > 1 else np.zeros(len(at), np.int64)
-    nearest: Floats = np.minimum(np.abs(at - ends_m[k]), np.abs(at - ends_m[np.maximum(k - 1, 0)]))
-    anchored: Bools = nearest < KNOWN_M
+    way_m, ends = graph.nodes.way_m, np.array([(c.old, c.new) for c in graph.closures], np.int64).ravel()
+    near = np.abs(way_m[graph.fragments.node, None] - way_m[ends]) < KNOWN_M
+    anchored: Bools = np.logical_or.reduce(near, axis=1)
     return anchored
 
 

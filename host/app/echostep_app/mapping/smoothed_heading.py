@@ -44,7 +44,10 @@ def with_smoothed_headings(segments: Sequence[MeasuredSegment]) -> list[Measured
         if belt is None:
             turned = rotated_segment(s, live - error)
         else:
-            grown = _growth(smooth, s) if smooth else belt.correction_rad - live
+            grown = belt.correction_rad - live
+            if smooth:
+                begin, end = np.interp([s.t0_s, s.t1_s], smooth.t_s, smooth.error_rad).tolist()
+                grown = end - begin
             turned = _turned(s, belt.correction_rad, live - error, error + 0.5 * grown, error + grown)
             turned = replace(turned, turn_sd_rad=_turn_sd(smooth, s, belt)) if smooth else turned
             live, error = belt.correction_rad, error + grown
@@ -84,12 +87,6 @@ def _smooth(chain: list[StanceHeadings]) -> _Smoothed | None:
         state = x + gain @ (state - predicted_x)
         errors.append(float(state[FOOT]))
     return _Smoothed(np.array([stance.t_s for stance in chain]), np.array(errors[::-1]), known)
-
-
-def _growth(found: _Smoothed, segment: PathSegment) -> float:
-    """Growth of the foot's error over a segment."""
-    begin, end = np.interp([segment.t0_s, segment.t1_s], found.t_s, found.error_rad).tolist()
-    return float(end - begin)
 
 
 def _turned(segment: PathSegment, live: float, begin: float, middle: float, end: float) -> PathSegment:

@@ -186,12 +186,8 @@ def test_a_commander_sends_only_to_a_place_that_is_known() -> None:
     ids = {row.name: row.id for row in team.scene().rows}
     request = parse_request(f'{{"kind":"send","id":{ids["Anna"]},"to":{ids["Finn"]},"by":"Ben"}}')
     assert request == Send(ids["Anna"], ids["Finn"], "Ben")
-    message = team.operation.act(request, team.unix_s, team.now_s)
-    assert isinstance(message, tuple)
-    team.put_bytes(*message)
-    board = MarkBoard()
-    board.receive(*message)
-    (errand,) = board.errands.values()
+    assert not team.ask(request)
+    (errand,) = team.operation._board.errands.values()
     assert (errand.to, errand.x_m, errand.y_m, errand.level, errand.by) == ("Finn", 7.0, 2.0, 2, "Ben")
     rescuers = team.operation.distress(ids["Finn"], team.now_s)
     assert rescuers is not None
@@ -199,5 +195,5 @@ def test_a_commander_sends_only_to_a_place_that_is_known() -> None:
     team.pass_time(1.0)
     assert "sent to Finn by Ben" in next(row for row in team.scene().rows if row.name == "Anna").notes
     for number, to in ((ids["Anna"], ids["Kim"]), (99, ids["Finn"]), (ids["Anna"], 99)):
-        refusal = team.operation.act(Send(number, to, "Ben"), team.unix_s, team.now_s)
-        assert refusal == "Not sent: the place of the one in distress is not known on this plan."
+        refusal = "Not sent: the place of the one in distress is not known on this plan."
+        assert team.ask(Send(number, to, "Ben")) == refusal

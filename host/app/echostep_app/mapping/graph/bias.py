@@ -10,24 +10,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats
 from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, find_directions
 from echostep_app.mapping.graph.fragments import find_fragments
-from echostep_app.mapping.graph.nodes import Nodes, Pings
+from echostep_app.mapping.graph.nodes import Nodes, Pings, rotated
 
 STEP_M = 10.0  # of path: a step of the search turns it by half of the drift over it
 # Scales of the steps, and, down to 1, of the drift: a bias is far from the walk's own drift, and only near it there is evidence
 SCALES = (4.0, 2.0, 1.0, 0.5, 0.25)
 MOST_STEPS = 12
-
-
-class _Tried(NamedTuple):
-    bias_rad_m: float
-    evidence: float
 
 
 def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
@@ -49,17 +42,16 @@ def find_bias(nodes: Nodes, pings: Pings, known_rad_m: float = 0.0) -> float:
 
 def _climbed(nodes: Nodes, pings: Pings, begin_rad_m: float, step: float) -> float:
     """The bias from which another step gains no evidence, on the side where the first step gains some."""
-    begin = _Tried(begin_rad_m, _evidence(nodes, pings, begin_rad_m))
+    begin = _evidence(nodes, pings, begin_rad_m)
     for way in (-step, step):
-        best = begin
+        best_rad_m, best = begin_rad_m, begin
         for _ in range(MOST_STEPS):
-            bias = best.bias_rad_m + way
-            tried = _Tried(bias, _evidence(nodes, pings, bias))
-            if tried.evidence <= best.evidence:
+            tried = _evidence(nodes, pings, best_rad_m + way)
+            if tried <= best:
                 break
-            best = tried
-        if best is not begin:
-            return best.bias_rad_m
+            best_rad_m, best = best_rad_m + way, tried
+        if best > begin:
+            return best_rad_m
     return begin_rad_m
 
 
@@ -75,16 +67,10 @@ def without_bias(nodes: Nodes, pings: Pings, bias_rad_m: float) -> tuple[Nodes, 
         return nodes, pings
     turn = bias_rad_m * nodes.way_m
     pose = nodes.pose.copy()
-    pose[1:, :2] = pose[0, :2] + np.cumsum(_rotated(np.diff(pose[:, :2], axis=0), 0.5 * (turn[1:] + turn[:-1])), axis=0)
+    pose[1:, :2] = pose[0, :2] + np.cumsum(rotated(np.diff(pose[:, :2], axis=0), 0.5 * (turn[1:] + turn[:-1])), axis=0)
     pose[:, 2] += turn
     after = np.minimum(pings.node + 1, len(turn) - 1)
-    off = _rotated(pings.at_m - nodes.pose[pings.node, :2], 0.5 * (turn[pings.node] + turn[after]))
+    off = rotated(pings.at_m - nodes.pose[pings.node, :2], 0.5 * (turn[pings.node] + turn[after]))
     at = pose[pings.node, :2] + off
     axis = pings.axis_rad + turn[pings.node] + pings.share * (turn[after] - turn[pings.node])
     return replace(nodes, pose=pose), replace(pings, at_m=at, axis_rad=axis)
-
-
-def _rotated(steps: Floats, turn_rad: Floats) -> Floats:
-    """Steps (n, 2), each turned by its own angle (n,)."""
-    c, s = np.cos(turn_rad), np.sin(turn_rad)
-    return np.column_stack([c * steps[:, 0] - s * steps[:, 1], s * steps[:, 0] + c * steps[:, 1]])

@@ -133,17 +133,13 @@ def _closure(graph: Graph, new: Ints, older: Ints, node: int) -> Closure | None:
             return None
         passage = _explaining(graph, single, older, at, matched.mean)
         if old_node in graph.fragments.node[passage]:
-            return _said(graph, node, old_node, matched)
+            if (news := gained(matched.mean, matched.after, matched.before)) is None:
+                return None
+            shift, information = news  # of the posterior, beyond the graph's
+            between = graph.pose[node] - graph.pose[old_node] + shift
+            return Closure(old_node, node, between, information, matched.log_odds)
         old_node = _nearest(graph, passage, at + matched.mean[:2])
     return None
-
-
-def _said(graph: Graph, node: int, old_node: int, matched: _Matched) -> Closure | None:
-    """The information of the posterior of the shift beyond the graph's; None if no axis has any."""
-    if (news := gained(matched.mean, matched.after, matched.before)) is None:
-        return None
-    shift, information = news
-    return Closure(old_node, node, graph.pose[node] - graph.pose[old_node] + shift, information, matched.log_odds)
 
 
 def _greatest_sd_m(covariance: Floats) -> float:

@@ -45,16 +45,12 @@ def people_share(nodes: Nodes, fragments: Fragments) -> Floats:
 
 def density_along_path(nodes: Nodes, fragments: Fragments) -> Floats:
     """Density (f,) of each fragment's direction, per radian, if its echoes are of a person: about the path's direction beside it."""
-    off = (nodes.pose[fragments.node, 2] + fragments.normal_rad - _course(nodes, fragments)) % math.pi - 0.5 * math.pi
+    half_m = np.maximum(fragments.half_m, LEAST_HALF_M)
+    course = course_of(nodes.pose, nodes.way_m, nodes.way_m[fragments.node], half_m)  # from its beginning to its end
+    off = (nodes.pose[fragments.node, 2] + fragments.normal_rad - course) % math.pi - 0.5 * math.pi
     sd = np.hypot(fragments.sd_rad, ALONG_SD_RAD)
     density: Floats = np.exp(-0.5 * (off / sd) ** 2) / (math.sqrt(2.0 * math.pi) * sd)
     return density
-
-
-def _course(nodes: Nodes, fragments: Fragments) -> Floats:
-    """Direction (f,) of the path by odometry from the beginning of each fragment to its end."""
-    half_m = np.maximum(fragments.half_m, LEAST_HALF_M)
-    return course_of(nodes.pose, nodes.way_m, nodes.way_m[fragments.node], half_m)
 
 
 def course_of(pose: Floats, way_m: Floats, middle_m: Floats, half_m: Floats | float = LEAST_HALF_M) -> Floats:
@@ -103,11 +99,11 @@ def find_directions(nodes: Nodes, fragments: Fragments) -> Directions:
         person[order],
         along_path[order],
     )
-    smoothed = _smoothed(seen)
-    direction = np.unwrap(smoothed.direction_rad, period=RIGHT_RAD)
+    smoothed, evidence = _smoothed(seen)
+    direction = np.unwrap(smoothed, period=RIGHT_RAD)
     base = float(direction[0])
     drift = base - np.interp(variance, variance[node], direction)
-    return Directions(base, drift, smoothed.evidence)
+    return Directions(base, drift, evidence)
 
 
 class Seen(NamedTuple):
@@ -122,16 +118,9 @@ class Seen(NamedTuple):
     along_path: Floats
 
 
-class Smoothed(NamedTuple):
-    """`direction_rad` (f,): the mean direction of the building by odometry, modulo a right angle, at each fragment; `evidence` of all together."""
-
-    direction_rad: Floats
-    evidence: float
-
-
 @kernel
-def _smoothed(seen: Seen) -> Smoothed:
-    """Forward and backward over the fragments."""
+def _smoothed(seen: Seen) -> tuple[Floats, float]:
+    """Forward and backward over the fragments: the mean direction (f,) of the building by odometry, modulo a right angle, at each; the evidence."""
     count = len(seen.angle_rad)
     forward, likely = np.zeros((count, CELLS)), np.zeros((count, CELLS))
     belief, evidence = np.full(CELLS, 1.0 / CELLS), 0.0
@@ -157,7 +146,7 @@ def _smoothed(seen: Seen) -> Smoothed:
         back *= likely[f]
         back /= back.sum()
         _diffuse(back, seen.variance[f])
-    return Smoothed(direction, evidence)
+    return direction, evidence
 
 
 @part

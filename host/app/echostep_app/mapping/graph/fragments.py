@@ -15,7 +15,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.jit import kernel, part
-from echostep_app.mapping.graph.nodes import Nodes, Pings
+from echostep_app.mapping.graph.nodes import Nodes, Pings, rotated
 
 LEAST, MISSES = 4, 3  # pings that begin a piece; pings in a row off the line that end it
 GATE_M = 0.12  # of a ping from the line: three standard deviations of range and sway
@@ -61,9 +61,7 @@ def find_fragments(nodes: Nodes, pings: Pings) -> Fragments:
     table = np.concatenate(rows)
     middle, node = table[:, 0:2], nearest_nodes(pings, owner, len(table))
     pose = nodes.pose[node]
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    dx, dy = middle[:, 0] - pose[:, 0], middle[:, 1] - pose[:, 1]
-    centre = np.column_stack([c * dx + s * dy, c * dy - s * dx])
+    centre = rotated(middle - pose[:, :2], -pose[:, 2])
     return Fragments(
         node,
         centre,

@@ -20,7 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep_app.mapping.graph.directions import ALIGNED, DIRECTION_SD_RAD, RIGHT_RAD
 from echostep_app.mapping.graph.fragments import Fragments
 from echostep_app.mapping.graph.levels import WalkLevels
-from echostep_app.mapping.graph.nodes import Nodes
+from echostep_app.mapping.graph.nodes import Nodes, rotated
 
 ROUNDS = 4  # of Gauss-Newton; the graph is nearly linear
 ONE_WALL = 0.8  # share of fragments that belong to the wall they lie on, at first; others, as furniture before it, lie anywhere within
@@ -125,9 +125,7 @@ class Graph:
     def _add_path(self, rows: _Rows) -> None:
         pose, odo, n = self.pose, self.nodes.pose, len(self.nodes)
         a, b = pose[:-1], pose[1:]
-        c0, s0 = np.cos(odo[:-1, 2]), np.sin(odo[:-1, 2])
-        d0 = odo[1:, :2] - odo[:-1, :2]
-        u = np.column_stack([c0 * d0[:, 0] + s0 * d0[:, 1], c0 * d0[:, 1] - s0 * d0[:, 0]])
+        u = rotated(odo[1:, :2] - odo[:-1, :2], -odo[:-1, 2])
         c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
         weight = 1.0 / self.nodes.sd_m
         i = np.arange(n - 1)
@@ -156,9 +154,7 @@ class Graph:
             return
         node, wall = f.node[used], walls.of[used]
         theta, first = self.pose[node, 2], 3 * len(self.nodes)
-        c, s = np.cos(theta), np.sin(theta)
-        x, y = f.centre_m[used].T
-        arm = np.column_stack([c * x - s * y, s * x + c * y])
+        arm = rotated(f.centre_m[used], theta)
         q = self.pose[node, :2] + arm
         phi = walls.normal_rad[wall]
         cp, sp_ = np.cos(phi), np.sin(phi)
@@ -230,9 +226,7 @@ class _Rows:
 def placed(fragments: Fragments, pose: Floats) -> tuple[Floats, Floats]:
     """Centres (f, 2) and normals (f,) of fragments, given the poses (n, 3) of all nodes."""
     at = pose[fragments.node]
-    c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
-    x, y = fragments.centre_m.T
-    return at[:, :2] + np.column_stack([c * x - s * y, s * x + c * y]), at[:, 2] + fragments.normal_rad
+    return at[:, :2] + rotated(fragments.centre_m, at[:, 2]), at[:, 2] + fragments.normal_rad
 
 
 def contradicted(graph: Graph, closure: Closure) -> float:

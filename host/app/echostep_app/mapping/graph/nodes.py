@@ -84,15 +84,15 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
             )
     table, sd, ping = np.array(rows), np.array(sds).reshape(-1, 2), np.concatenate(pings)
     nodes = Nodes(table[:, 0], table[:, 1:4].copy(), sd[:, 0], sd[:, 1], table[:, 4])
-    return nodes, Pings(
-        ping[:, :2].copy(),
-        ping[:, 2].copy(),
-        ping[:, 3].copy(),
-        ping[:, 4].astype(np.int64),
-        ping[:, 5].copy(),
-        ping[:, 6].astype(np.int64),
-        ping[:, 7].copy(),
-    )
+    axis, range_m, ranger, off, node, share = ping[:, 2:].T.copy()
+    return nodes, Pings(ping[:, :2].copy(), axis, range_m, ranger.astype(np.int64), off, node.astype(np.int64), share)
+
+
+def rotated(points: Floats, angle_rad: Floats) -> Floats:
+    """Points (n, 2), each turned by its own angle (n,)."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    x, y = points.T
+    return np.column_stack([c * x - s * y, s * x + c * y])
 
 
 def _turn_growth(segment: PathSegment) -> float:

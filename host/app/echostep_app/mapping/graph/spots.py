@@ -16,7 +16,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.jit import kernel
 from echostep_app.mapping.graph.directions import LEAST_EVIDENCE, RIGHT_RAD, Directions
 from echostep_app.mapping.graph.fragments import FARTHEST_M, SD_M, Fragments, nearest_nodes
-from echostep_app.mapping.graph.nodes import Nodes, Pings
+from echostep_app.mapping.graph.nodes import Nodes, Pings, rotated
 
 LEAST, MISSED = 5, 1  # pings of a ranger, and how many between two may be of other places
 SWEEP_RAD = math.radians(25.0)  # of the axis, with the same range: half of the cone
@@ -56,20 +56,13 @@ def _on_walls(nodes: Nodes, node: Ints, spots: Floats, normal_rad: Floats) -> tu
     on_wall = spots[:, :2] + range_m[:, None] * np.column_stack([np.cos(normal_rad), np.sin(normal_rad)])
     return (
         node,
-        _in_frames(on_wall, pose),
+        rotated(on_wall - pose[:, :2], -pose[:, 2]),
         normal_rad - pose[:, 2],
         np.full(count, SPOT_HALF_M),
         np.hypot(SD_M, CORNER * range_m),
         np.full(count, ACROSS_RAD),
         spots[:, 4].astype(np.int64),
     )
-
-
-def _in_frames(points: Floats, pose: Floats) -> Floats:
-    """Points (n, 2) in the frames of poses (n, 3): x ahead, y left."""
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    dx, dy = (points - pose[:, :2]).T
-    return np.column_stack([c * dx + s * dy, c * dy - s * dx])
 
 
 def _both_rangers(pings: Pings, free: Bools) -> tuple[Floats, Ints]:

@@ -18,6 +18,7 @@ from echostep_app.mapping.graph.directions import ALONG_SD_RAD, course_of
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.nodes import Pings
 from echostep_app.mapping.walls.evidence import (
+    Cells,
     add_crossings,
     add_sights,
     cell_counts,
@@ -90,30 +91,29 @@ def _drawn(graph: Graph, pings: Pings, paths: tuple[Floats, ...]) -> Drawing:
     poses = ping_poses(graph, pings)
     way_m, ahead = graph.nodes.way_m[pings.node], is_straight(graph, pings)
     placed_pings = _Heard(poses, way_m, course_of(graph.pose, graph.nodes.way_m, way_m))
-    lines = find_lines(graph)
-    free = np.ones(len(poses), np.bool_)
+    lines, every = find_lines(graph), np.ones(len(poses), np.bool_)
+
+    def counted(some: Lines, free: Bools) -> Cells:
+        cells = cell_counts(some, poses, pings.range_m, free, ahead)
+        add_crossings(some, paths, cells)
+        add_sights(some, poses, pings.range_m, ahead, cells)
+        return cells
+
     aligned = lines.aligned if lines.aligned.any() else np.ones(len(lines.rho_m), np.bool_)
     straight = _selected(lines, aligned)
-    cells = cell_counts(straight, poses, pings.range_m, free, ahead)
-    add_crossings(straight, paths, cells)
-    add_sights(straight, poses, pings.range_m, ahead, cells)
+    cells = counted(straight, every)
     candidates = find_runs(cells, ACROSS if lines.aligned.any() else ANY)
     runs = _without_lone(candidates, straight, LONE_M, placed_pings, cells.of)
     if not aligned.all():
         walls = segments_of(straight, runs, cells)
         free = (cells.of < 0) & ~explained_by_ends(walls, poses, pings.range_m)
         askew = _selected(lines, ~aligned)
-        more = cell_counts(askew, poses, pings.range_m, free, ahead)
-        add_crossings(askew, paths, more)
-        add_sights(askew, poses, pings.range_m, ahead, more)
+        more = counted(askew, free)
         candidates = _without_lone(find_runs(more, ASKEW), askew, LONE_ASKEW_M, placed_pings, more.of)
         with_runs = sorted({run.line for run in candidates})
-        both = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), with_runs)))
         runs += [run._replace(line=len(straight.rho_m) + with_runs.index(run.line)) for run in candidates]
-        cells = cell_counts(both, poses, pings.range_m, np.ones(len(poses), np.bool_), ahead)
-        add_crossings(both, paths, cells)
-        add_sights(both, poses, pings.range_m, ahead, cells)
-        straight = both
+        straight = joined(straight, _selected(askew, np.isin(np.arange(len(askew.rho_m)), with_runs)))
+        cells = counted(straight, every)
     walls = segments_of(straight, runs, cells)
     sd_m = wall_sds(graph, pings, poses, straight, runs, cells.of)
     placed = placed_pieces(graph, pings, poses, straight, runs, cells.of)
@@ -167,11 +167,4 @@ def _passages(way_m: Floats) -> int:
 
 
 def _selected(lines: Lines, which: Bools) -> Lines:
-    return Lines(
-        lines.normal_rad[which],
-        lines.rho_m[which],
-        lines.sd_m[which],
-        lines.low_m[which],
-        lines.high_m[which],
-        lines.aligned[which],
-    )
+    return Lines._make(column[which] for column in lines)

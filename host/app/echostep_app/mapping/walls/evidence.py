@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,9 @@ CELL_M = 0.05
 SMOOTH = 2  # cells to either side that a ping speaks for: 8.5 cm between two pings of a ranger at 1.2 m/s
 MARGIN_M = 2.0  # of cells beyond the extent of a line's fragments
 FITS_M = 0.1  # of a range from the distance of the line
-BEYOND_M = 0.18  # a range longer by more than this passed through the cell
 HALF_CONE_RAD = math.radians(27.5)
-BEYOND_M = 0.5  # beyond the extent of its fragments, within which a line explains pings
+# A range longer by more than this passed through the cell; also beyond the extent of its fragments, within which a line explains pings
+BEYOND_M = 0.5
 HALF_TRUNK_M, CROSSED = 0.25, 100.0  # the path leads through an opening at least this wide; its weight against pings
 CORNER_M = 0.15  # of a range from the distance of a corner
 TURNING_RAD = math.radians(15.0)  # turn of a stride
@@ -80,12 +81,7 @@ def cell_counts(lines: Lines, poses: Floats, range_m: Floats, free: Bools, strai
 
 def add_crossings(lines: Lines, paths_m: Sequence[Floats], cells: Cells) -> None:
     """Cells of lines through which a path (n, 2) leads are open, half a trunk to either side."""
-    for path_m in paths_m:
-        _add_crossings(lines, path_m, cells)
-
-
-def _add_crossings(lines: Lines, path_m: Floats, cells: Cells) -> None:
-    for line in range(len(cells.size)):
+    for path_m, line in product(paths_m, range(len(cells.size))):
         c, s = math.cos(lines.normal_rad[line]), math.sin(lines.normal_rad[line])
         off, along = c * path_m[:, 0] + s * path_m[:, 1] - lines.rho_m[line], c * path_m[:, 1] - s * path_m[:, 0]
         k = np.flatnonzero(off[1:] * off[:-1] < 0.0)

@@ -62,14 +62,7 @@ def find_lines(graph: Graph) -> Lines:
 
 def joined(a: Lines, b: Lines) -> Lines:
     """The lines of both."""
-    return Lines(
-        np.concatenate([a.normal_rad, b.normal_rad]),
-        np.concatenate([a.rho_m, b.rho_m]),
-        np.concatenate([a.sd_m, b.sd_m]),
-        np.concatenate([a.low_m, b.low_m]),
-        np.concatenate([a.high_m, b.high_m]),
-        np.concatenate([a.aligned, b.aligned]),
-    )
+    return Lines._make(np.concatenate(columns) for columns in zip(a, b, strict=True))
 
 
 def _line(centre: Floats, normal_rad: float, half_m: Floats, base_rad: float | None) -> Floats:
