@@ -79,7 +79,7 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
         "IMAGE": lambda: space.add_image(doc.add_image_def("a.png", (9, 9)), (1, 1), (3, 3), dxfattribs=WALL),
         "PDFUNDERLAY": lambda: space.add_underlay(doc.add_underlay_def("a.pdf"), (1, 1), dxfattribs=WALL),
         "INSERT without contents": lambda: space.add_blockref(doc.blocks.new("EMPTY").name, (1, 1), dxfattribs=WALL),
-        "TEXT": lambda: space.add_text("W1", dxfattribs=WALL),
+        "TEXT": lambda: space.add_text("W1", dxfattribs=WALL).set_placement((0, -9)),  # outside of any room
         "MTEXT": lambda: space.add_mtext("W2", dxfattribs=WALL),
         "POINT": lambda: space.add_point((1, 1), dxfattribs=WALL),
         "XLINE": lambda: space.add_xline((0, 0), (1, 1), dxfattribs=WALL),
