@@ -176,7 +176,8 @@ def _named(entity: Any, frame: DrawingFrame) -> Room | None:
     hidden = entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
     if hidden or entity.dxftype() not in TEXTS:
         return None
-    lines = [line for line in entity.plain_text().replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
+    text = (entity.dxftype() == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()  # an attribute may have several lines
+    lines = [line for line in text.replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
     at = entity.dxf.insert
     x, y = frame.metres(at if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.get_placement()[1] or at))
