@@ -111,18 +111,6 @@ def test_kinds_of_partitions_are_no_storeys(tmp_path: Path) -> None:
     assert "storeys P1, P2, but they do not lie over each other" in report.doubts[0]
 
 
-@pytest.mark.parametrize("other", ["A-WALL-X", "X-17"])
-def test_storeys_that_nothing_names_are_told_and_not_advised(tmp_path: Path, other: str) -> None:
-    doc, space = sheet()
-    house(space, begin=2.0)
-    house(space, other, begin=5.0)
-    _, report = imported(doc, tmp_path)
-    told = [doubt for doubt in report.doubts if "another storey? End the names of its layers with _L1" in doubt]
-    assert len(told) == 1
-    assert other in told[0]
-    assert not any("takes it in" in doubt for doubt in report.doubts)
-
-
 def test_cells_beside_each_other_are_no_storeys(tmp_path: Path) -> None:
     doc, space = sheet()
     for k in range(32):

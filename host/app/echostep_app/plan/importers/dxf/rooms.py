@@ -176,7 +176,7 @@ def _named(entity: Any, frame: DrawingFrame) -> Room | None:
     hidden = entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
     if hidden or entity.dxftype() not in TEXTS:
         return None
-    text = (entity.dxftype() == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()  # an attribute may have several lines
+    text = (entity.dxftype() == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()
     lines = [line for line in text.replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
     at = entity.dxf.insert

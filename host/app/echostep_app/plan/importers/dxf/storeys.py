@@ -93,14 +93,14 @@ def has_room(lines: Sequence[LineString] | np.ndarray[Any, Any]) -> bool:
     return any(part.interiors for part in shapely.get_parts(closed))
 
 
-def drawn_over(one: Sequence[LineString], other: Sequence[LineString], most: float = math.inf) -> bool:
-    """Whether walls are those of two storeys over each other: they cross well before their ends, or coincide, by up to the share `most`."""
+def drawn_over(one: Sequence[LineString], other: Sequence[LineString]) -> bool:
+    """Whether walls are those of two storeys over each other: they cross well before their ends, or coincide."""
     a, b = (shapely.linestrings(pieces_of(lines).reshape(-1, 2, 2)) for lines in (one, other))
     tree = shapely.STRtree(b)
     near = np.unique(tree.query(a, predicate="dwithin", distance=SAME_M)[1])
     bands = shapely.union_all(shapely.buffer(b[near], SAME_M, cap_style="flat"))
     shared_m = shapely.length(shapely.intersection(shapely.union_all(a), bands))
-    if COINCIDE < shared_m / min(shapely.length(shapely.union_all(walls)) for walls in (a, b)) < most:
+    if shared_m > COINCIDE * min(shapely.length(shapely.union_all(walls)) for walls in (a, b)):
         return True
     i, j = tree.query(a, predicate="crosses")
     at = shapely.intersection(a[i], b[j])

@@ -219,7 +219,9 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
                 name = (tags.get("name") or tags.get("ref") or entrance)[:80]
                 site.drawn_levels[level].doors.append(Door(gap, _state(tags), name))
     if ground:
-        report.doubt(f"doors without level on outlines, and entrances, are on the ground ({', '.join(ground[:5])}): tag level=*")
+        report.doubt(
+            f"doors without level on outlines, and entrances, are on the ground ({', '.join(ground[:5])}): tag level=*"
+        )
     if odd:
         report.doubt(
             f"{len(odd)} doors were taken as {DOOR_M:g} m wide ({', '.join(odd[:3])}): write it in metres, as width=0.9, or with its unit"
