@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from echostep.plan import Plan
-from echostep_app.plan.importers.storey_names import in_order, storey_of
+from echostep_app.plan.importers.storey_names import storey_of
 from plan.drawings.drawn_houses import WALL, boxes, corners, house, outlines, sheet
 from plan.drawings.test_layers_of_drawings import imported
 
@@ -130,8 +130,3 @@ def test_cells_beside_each_other_are_no_storeys(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_names_of_storeys(name: str, number: int | None) -> None:
     assert (None if (storey := storey_of(name)) is None else storey.number) == number
-
-
-def test_the_order_of_storeys() -> None:
-    assert in_order(["OG", "b", "EG"]) == ["OG", "b", "EG"]
-    assert in_order(["1.OG", "L0", "KG"]) == ["KG", "L0", "1.OG"]

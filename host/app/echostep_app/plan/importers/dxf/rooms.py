@@ -100,7 +100,20 @@ def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written]
 
 
 def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
-    """Texts beneath each other, or in one block, as lines of one room's name; of these, smaller letters and measures are none."""
+    """Texts as lines of rooms' names; smaller letters and measures are none."""
+    rooms = []
+    for stamp in _beneath(texts):
+        least_m = SAME_HEIGHT * max(one.height_m for one in stamp)
+        large = [text for text in stamp if text.height_m >= least_m or PART.search(text.tag)]
+        lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
+        rooms.append(_joined(lines))
+        for text in stamp:
+            report.leave_out(text.what, text not in lines)
+    return rooms
+
+
+def _beneath(texts: Sequence[Written]) -> list[list[Written]]:
+    """Texts beneath each other, or in one block: the lines of each room's name."""
     texts = sorted(texts, key=lambda one: (-one.read_at()[1], one.read_at()[0]))
     places = shapely.points(np.array([text.room.at_m for text in texts]).reshape(-1, 2))
     tree, reach_m = shapely.STRtree(places), 2.0 * NEXT_LINE * max((text.height_m for text in texts), default=0.0)
@@ -112,15 +125,11 @@ def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
         below = min(above, key=lambda stamp: stamp[-1].read_at()[1], default=[])
         stamps[k] = blocks.setdefault(text.block, below) if text.block else below
         stamps[k].append(text)
-    rooms = []
-    for stamp in {id(stamp): stamp for stamp in stamps.values()}.values():
-        least_m = SAME_HEIGHT * max(one.height_m for one in stamp)
-        large = [text for text in stamp if text.height_m >= least_m or PART.search(text.tag)]
-        lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
-        rooms.append(Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m))
-        for text in stamp:
-            report.leave_out(text.what, text not in lines)
-    return rooms
+    return list({id(stamp): stamp for stamp in stamps.values()}.values())
+
+
+def _joined(lines: Sequence[Written]) -> Room:
+    return Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m)
 
 
 def _follows(text: Written, last: Written) -> bool:
@@ -151,34 +160,22 @@ def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
     lines = [text for text in words if text.height_m >= largest]
     for line in lines:
         report.take_back(line.what)
-    names: list[list[Written]] = []
-    for line in sorted(lines, key=lambda one: (-one.room.at_m[1], one.room.at_m[0])):
-        above = next((name for name in names if _follows(line, name[-1])), None)
-        if above is None:
-            names.append(above := [])
-        above.append(line)
-    return [Room(" ".join(line.room.name for line in name)[:80], name[0].room.at_m) for name in names]
+    return [_joined(name) for name in _beneath(lines)]
 
 
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
-    """A text of any layer; None when the entity is no text."""
-    named = _named(entity, frame)
-    if named is None:
+    """A text of any layer; None when the entity is empty, a size, far away, or not a text."""
+    kind = entity.dxftype()
+    if kind not in TEXTS or (kind == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))):
         return None
-    height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0)
-    turn = math.radians(entity.get_rotation() if entity.dxftype() == "MTEXT" else entity.dxf.get("rotation", 0.0))
-    block, tag = (entity.dxf.owner, entity.dxf.tag) if entity.dxftype() == "ATTRIB" else ("", "")
-    return Written(named, float(height) * frame.scale_m, turn, f"{entity.dxftype()} on {layer[:40]}", block, tag)
-
-
-def _named(entity: Any, frame: DrawingFrame) -> Room | None:
-    """A text entity as a room; None when it is empty, a size, far away, or not a text."""
-    hidden = entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
-    if hidden or entity.dxftype() not in TEXTS:
-        return None
-    text = (entity.dxftype() == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()
+    text = (kind == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()
     lines = [line for line in text.replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
-    at = entity.dxf.insert
-    x, y = frame.metres(at if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.get_placement()[1] or at))
-    return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None
+    at, is_mtext = entity.dxf.insert, kind == "MTEXT"
+    x, y = frame.metres(at if is_mtext else entity.ocs().to_wcs(entity.get_placement()[1] or at))
+    if not words or not max(abs(x), abs(y)) < LIMIT_M:
+        return None
+    height_m = float(entity.dxf.get("char_height" if is_mtext else "height", 0.0)) * frame.scale_m
+    turn = math.radians(entity.get_rotation() if is_mtext else entity.dxf.get("rotation", 0.0))
+    block, tag = (entity.dxf.owner, entity.dxf.tag) if kind == "ATTRIB" else ("", "")
+    return Written(Room(words, (round(x, 3), round(y, 3))), height_m, turn, f"{kind} on {layer[:40]}", block, tag)

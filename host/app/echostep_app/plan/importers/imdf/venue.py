@@ -121,7 +121,8 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
             report.leave_out(
                 "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
             )
-        _outline(drawn, next(level for level in levels if level.key == key))
+        level = next(level for level in levels if level.key == key)
+        drawn.walls += [area.boundary for area in areas([level.shape]) if level.about.get("outdoor") is not True]
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
         _place_doors(drawn, openings[key], report)
@@ -260,12 +261,6 @@ def _onto(line: Line, wall: BaseGeometry, middle: Point) -> Line:
     if np.hypot(*(moved[1] - moved[0])) < ALONG * np.hypot(*(ends[1] - ends[0])):
         return line
     return float(moved[0, 0]), float(moved[0, 1]), float(moved[1, 0]), float(moved[1, 1])
-
-
-def _outline(drawn: DrawnLevel, level: Feature) -> None:
-    """The outline of a level becomes a wall, unless the level is outdoors."""
-    if level.about.get("outdoor") is not True:
-        drawn.walls += [area.boundary for area in areas([level.shape])]
 
 
 def _unit(drawn: DrawnLevel, unit: Feature, openings: list[BaseGeometry]) -> None:
