@@ -122,9 +122,7 @@ def narrowest_opening(segments: Floats, at_m: tuple[float, float]) -> tuple[floa
             opening = (free, WIDTHS_M[middle])
     if opening is None or opening[0] is None:
         return None
-    across = shapely.shortest_line(
-        *opening[0]
-    )  # from the room to the outside: through the opening that the thickness has closed
+    across = shapely.shortest_line(*opening[0])  # from the room to the outside: through the opening that is closed
     return None if across.intersects(walls) else (float(across.centroid.x), float(across.centroid.y), opening[1])
 
 

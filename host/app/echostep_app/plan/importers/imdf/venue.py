@@ -115,14 +115,13 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     units = _by_level(_features(archive, "unit", earth), drawn_levels, report)
     if not any(units.values()):
         raise EchostepError(f"{path}: {_file(archive, 'unit')}: no units on these levels: export all files again")
-    order = list(drawn_levels)
     for key, drawn in drawn_levels.items():
         if doors_m is None:
             report.leave_out(
                 "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
             )
-        level = next(level for level in levels if level.key == key)
-        drawn.walls += [area.boundary for area in areas([level.shape]) if level.about.get("outdoor") is not True]
+        inside = [one.shape for one in levels if one.key == key and one.about.get("outdoor") is not True]
+        drawn.walls += [area.boundary for area in areas(inside)]
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
         _place_doors(drawn, openings[key], report)
@@ -137,7 +136,7 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
                 report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
             else:
                 report.leave_out(f"fixture {fixture.category}")
-    numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
+    numbered = {unit.key: (k, unit) for k, key in enumerate(drawn_levels) for unit in units[key]}
     _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
     return plan_of(name, list(drawn_levels.values()), report, georeference)
