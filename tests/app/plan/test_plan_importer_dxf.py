@@ -101,3 +101,7 @@ def test_room_numbers_of_blocks(tmp_path: Path) -> None:
     for k, (tag, text) in enumerate(texts.items()):
         beside.add_attrib(tag, text, (6 + 0.5 * (k % 2), 2 - 0.6 * k), layer)
     assert [room.name for room in imported(doc, tmp_path).levels[0].rooms] == ["2.14", "101 Office"]
+    tag = space.add_blockref("TAG", (8, 2), {"layer": "A-ROOM"}).add_attrib("ROOM_NAME", "Meeting", (8, 2), layer)
+    tag.embed_mtext(space.add_mtext("Meeting\\PNorth"))
+    doc.dxfversion = "R2018"
+    assert [room.name for room in imported(doc, tmp_path).levels[0].rooms] == ["2.14", "101 Office", "Meeting North"]

@@ -64,6 +64,11 @@ def test_what_becomes_of_a_house(tmp_path: Path) -> None:
     assert plan.georeference.latitude_deg == pytest.approx(LAT, abs=1e-4)
 
 
+def test_an_entrance_without_level_is_on_the_ground(tmp_path: Path) -> None:
+    house = [one | {"tags": {"entrance": "staircase"}} if one["id"] == 7 else one for one in HOUSE]
+    assert [len(level.doors) for level in imported(tmp_path, house).levels] == [2, 0]
+
+
 def test_multipolygons_glass_and_locked_doors(tmp_path: Path) -> None:
     members = [{"type": "way", "ref": 30, "role": "outer"}]
     tags = {"type": "multipolygon", "indoor": "room", "level": "2"}

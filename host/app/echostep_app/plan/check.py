@@ -97,16 +97,14 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
     """Doors with an end that is not at a wall, and doors that a wall runs through."""
     for number, door in enumerate(level.doors):
         name = f"door {door.name or number}"
-        line = shapely.LineString((door.line[:2], door.line[2:]))
-        middle = line.interpolate(0.5, normalized=True)
-        at, lines = (middle.x, middle.y), (door.line,)
-        ends = (shapely.Point(door.line[:2]), shapely.Point(door.line[2:]))
-        loose = [_distance(tree, point) for point in ends]
-        if max(loose) > JAMB_M:
-            words = "ends in no wall" if np.isinf(max(loose)) else f"ends {max(loose):.2f} m from any wall"
+        (x0, y0, x1, y1), lines = door.line, (door.line,)
+        at = (x0 + x1) / 2, (y0 + y1) / 2
+        off_m = max(_distance(tree, shapely.Point(end)) for end in ((x0, y0), (x1, y1)))
+        if off_m > JAMB_M:
+            words = "ends in no wall" if np.isinf(off_m) else f"ends {off_m:.2f} m from any wall"
             yield PlanFinding("door", i, at, f"{name} {words}", lines)
         if door.width_m > WIDEST_M:
-            text = f"door {door.name or number} is {door.width_m:.3g} m wide: is the plan in metres?"
+            text = f"{name} is {door.width_m:.3g} m wide: is the plan in metres?"
             yield PlanFinding("door", i, at, text, lines)
         if is_walled(door, tree):
             text = f"a wall runs through {name} or along it: doors are gaps in the walls"

@@ -188,13 +188,3 @@ def test_a_swing_on_any_layer_at_a_wall_drawn_through_is_a_door_or_a_question(
     assert len(level.doors) == is_leaf
     assert "drawn through" in report.doubts[0]
     assert (report.left_out == {}) is (is_leaf or layer in ("A-WALL", "A-GLAZ"))
-
-
-@pytest.mark.parametrize("layer", ["A-WALL-OPENINGS", "L00_FP_OPENINGS", "WANDOEFFNUNG"])
-def test_openings_are_doors(tmp_path: Path, layer: str) -> None:
-    doc, space = sheet()
-    house(space)
-    outlines(space, (4, 3, 4.1, 3.9), layer)
-    level, _ = imported(doc, tmp_path)
-    assert len(level.doors) == 1
-    assert len(level.walls) == 14

@@ -187,25 +187,20 @@ def test_ways_out_are_no_walls_and_their_texts_no_names(tmp_path: Path, layer: s
     assert report.left_out == {f"LWPOLYLINE on {layer}": 2, f"TEXT on {layer}": 1}
 
 
-def test_most_walls_on_another_layer_are_asked_for(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("layer", "told", "walls"),
+    [
+        ("A-WALL", r"named as walls have 12 m.*X-17.*--layer walls=A-WALL --layer walls=X-17", 14),
+        ("COLUMNA", "no layer has the name of walls but columns.*X-17.*--layer walls=X-17", 18),
+    ],
+)
+def test_most_walls_on_another_layer_are_asked_for(tmp_path: Path, layer: str, told: str, walls: int) -> None:
     doc, space = sheet()
     house(space, "X-17")
-    space.add_line((3, 3), (3, 6), WALL)
-    with pytest.raises(EchostepError, match=r"named as walls have 3 m.*X-17.*--layer walls=A-WALL --layer walls=X-17"):
+    space.add_lwpolyline(corners((9.2, 2, 9.6, 7.6)), close=True, dxfattribs={"layer": layer})
+    with pytest.raises(EchostepError, match=told):
         imported(doc, tmp_path)
-    plan, _ = imported(doc, tmp_path, layers={"walls": ["X-17"]})
-    assert len(plan.levels[0].walls) == 14
-
-
-def test_columns_alone_are_no_building(tmp_path: Path) -> None:
-    doc, space = sheet()
-    house(space, "X-17")
-    space.add_lwpolyline(corners((9.2, 7.2, 9.6, 7.6)), close=True, dxfattribs={"layer": "COLUMNA"})
-    with pytest.raises(EchostepError, match=r"no layer has the name of walls but columns.*X-17.*--layer walls=X-17"):
-        imported(doc, tmp_path)
-    plan, report = imported(doc, tmp_path, layers={"walls": ["X-17"]})
-    assert len(plan.levels[0].walls) == 18
-    assert report.layers == {"walls": ["X-17"], "columns": ["COLUMNA"]}
+    assert len(imported(doc, tmp_path, layers={"walls": ["X-17"]})[0].levels[0].walls) == walls
 
 
 @pytest.mark.parametrize(
@@ -215,6 +210,7 @@ def test_columns_alone_are_no_building(tmp_path: Path) -> None:
         ("PUERTA", "doors"), ("S-COLS", "columns"), ("A-GLAZ", "windows"), ("A-FLOR-STRS", "stairs"), ("SCALE-BAR", None), ("A-AREA-IDEN", "rooms"),
         ("A-WALL-ABOV", None), ("A-WALL-OVHD", None), ("A-WALL-CNTR", None), ("A-WALL-HEAD", None), ("A-WALL-LOW", "walls"),
         ("Achsen-Wand", None), ("Wandtapete", None), ("Wallpaper", None), ("A-ROOM-WALLFINISH", None),
+        ("A-WALL-OPENINGS", "doors"), ("L00_FP_OPENINGS", "doors"), ("WANDOEFFNUNG", "doors"),
     ],
 )  # fmt: skip
 def test_names_of_layers(layer: str, kind: str | None) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from echostep.plan import Plan
-from echostep_app.plan.importers.storey_names import in_order, storey_of
+from echostep_app.plan.importers.storey_names import storey_of
 from plan.drawings.drawn_houses import WALL, boxes, corners, house, outlines, sheet
 from plan.drawings.test_layers_of_drawings import imported
 
@@ -111,18 +111,6 @@ def test_kinds_of_partitions_are_no_storeys(tmp_path: Path) -> None:
     assert "storeys P1, P2, but they do not lie over each other" in report.doubts[0]
 
 
-@pytest.mark.parametrize("other", ["A-WALL-X", "X-17"])
-def test_storeys_that_nothing_names_are_told_and_not_advised(tmp_path: Path, other: str) -> None:
-    doc, space = sheet()
-    house(space, begin=2.0)
-    house(space, other, begin=5.0)
-    _, report = imported(doc, tmp_path)
-    told = [doubt for doubt in report.doubts if "another storey? End the names of its layers with _L1" in doubt]
-    assert len(told) == 1
-    assert other in told[0]
-    assert not any("takes it in" in doubt for doubt in report.doubts)
-
-
 def test_cells_beside_each_other_are_no_storeys(tmp_path: Path) -> None:
     doc, space = sheet()
     for k in range(32):
@@ -142,8 +130,3 @@ def test_cells_beside_each_other_are_no_storeys(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_names_of_storeys(name: str, number: int | None) -> None:
     assert (None if (storey := storey_of(name)) is None else storey.number) == number
-
-
-def test_the_order_of_storeys() -> None:
-    assert in_order(["OG", "b", "EG"]) == ["OG", "b", "EG"]
-    assert in_order(["1.OG", "L0", "KG"]) == ["KG", "L0", "1.OG"]

@@ -53,9 +53,8 @@ class DrawnLevel:
     obstacles: list[Polygon] = field(default_factory=list)
     rooms: list[Room] = field(default_factory=list)
     connectors: list[ConnectorShape] = field(default_factory=list)
-    cuts: list[BaseGeometry] = field(
-        default_factory=list
-    )  # where walls drawn as lines are cut, besides the doors' lines
+    # Where walls drawn as lines are cut, besides the doors' lines
+    cuts: list[BaseGeometry] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
 
     def level(self) -> Level:
@@ -93,9 +92,8 @@ def cut(line: BaseGeometry, openings: list[BaseGeometry], jambs: list[BaseGeomet
     if not openings:
         return line
     across = pieces([line.intersection(shapely.union_all(jambs))])
-    kept = [
-        part for part in across if part.length > 6.0 * ACROSS_M
-    ]  # a third of this length of a line along the door is inside
+    # A third of this length of a line along the door is inside
+    kept = [part for part in across if part.length > 6.0 * ACROSS_M]
     return joined(shapely.union_all([line.difference(shapely.union_all(openings)), *kept]))
 
 

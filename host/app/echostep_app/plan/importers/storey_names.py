@@ -21,22 +21,10 @@ ABOVE = {
     "planta", "piano", "verdieping",
 }  # fmt: skip
 BELOW = {
-    "kg",
-    "ug",
-    "keller",
-    "kellergeschoss",
-    "untergeschoss",
-    "basement",
-    "souterrain",
-    "sous",
-    "sótano",
-    "sotano",
-    "interrato",
-}
-CODES = {
-    **dict.fromkeys("lpefn", 1),
-    **dict.fromkeys("bus", -1),
-}  # letters before a number without a space, as L1, P2, B1
+    "kg", "ug", "keller", "kellergeschoss", "untergeschoss", "basement", "souterrain", "sous", "sótano", "sotano", "interrato",
+}  # fmt: skip
+# Letters before a number without a space, as L1, P2, B1
+CODES = dict.fromkeys("lpefn", 1) | dict.fromkeys("bus", -1)
 MOST_CODED, MOST, LONGEST = 20, 99, 4  # storeys; greater numbers are measures; letters of a number
 SPELT = {"first": "1", "second": "2", "third": "3", "fourth": "4", "premier": "1", "primer": "1", "primo": "1"}
 BESIDE = {"st", "nd", "rd", "th", "er", "ème", "eme", "º", "ª", "sol"}  # between a number and its word
@@ -53,16 +41,10 @@ class StoreyName(NamedTuple):
 
 def storey_of(name: str) -> StoreyName | None:
     """The storey that a name names; None where it names none, or several."""
-    found = [
-        (SPELT.get(token[0], token[0]), *token.span())
-        for token in TOKEN.finditer(name.casefold().replace("\u2212", "-"))
-    ]
-    tokens = [token for token in found if token[0] not in BESIDE]
-    storeys: dict[int, str] = {}
-    for k in range(len(tokens)):
-        if (named := _named(tokens, k)) is not None:
-            number, used = named
-            storeys.setdefault(number, name[min(t[1] for t in used) : max(t[2] for t in used)])
+    found = TOKEN.finditer(name.casefold().replace("\u2212", "-"))
+    tokens = [(SPELT.get(token[0], token[0]), *token.span()) for token in found if token[0] not in BESIDE]
+    named = [one for k in range(len(tokens)) if (one := _named(tokens, k)) is not None]
+    storeys = {number: name[min(t[1] for t in used) : max(t[2] for t in used)] for number, used in reversed(named)}
     return StoreyName(*storeys.popitem()) if len(storeys) == 1 else None
 
 

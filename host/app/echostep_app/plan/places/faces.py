@@ -37,11 +37,7 @@ class Faces:
     def indices_of(self, points: Floats) -> NDArray[np.intp]:
         """Points (n, 2) in metres -> (n,) index of the face around each, or OUTSIDE."""
         indices = np.full(len(points), OUTSIDE, dtype=np.intp)
-        which, face = (
-            self.tree.query(shapely.points(points), predicate="intersects")
-            if len(points)
-            else np.zeros((2, 0), dtype=np.intp)
-        )
+        which, face = self.tree.query(shapely.points(points), predicate="intersects")
         indices[which] = face
         return indices
 

@@ -82,13 +82,9 @@ def _free_ends(walls: Floats, lines: Floats, level: Level) -> tuple[Floats, Floa
     end, other = shapely.STRtree(lines[long]).query(points, predicate="dwithin", distance=TOUCH_M)
     free = np.ones(len(ends), dtype=bool)
     free[end[end // 2 != other]] = False
-    if level.doors:
-        doors = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
-        free[
-            shapely.STRtree(doors).query(
-                points, predicate="dwithin", distance=length[jamb].max(initial=LONGEST_JAMB_M)
-            )[0]
-        ] = False
+    doors = shapely.STRtree(shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2)))
+    reach_m = length[jamb].max(initial=LONGEST_JAMB_M)
+    free[doors.query(points, predicate="dwithin", distance=reach_m)[0]] = False
     return ends[free], outward[free]
 
 

@@ -57,19 +57,20 @@ def _parts(
 ) -> Iterator[PlanFinding]:
     """Large parts of levels without a named room that are not connected to `home`, or without any room to the largest part."""
     sizes: list[Counter[Face]] = [Counter() for _ in faces]
-    middles: dict[Face, Point] = {}
+    middles: dict[tuple[int, Face], Point] = {}
     joined = {i for connector in plan.connectors for i in connector.levels}
     for i, level in enumerate(faces):
         for k, area in enumerate(level.areas if i in joined or len(faces) == 1 else ()):
             if not area.buffer(-HOLLOW_M / 2).is_empty:
-                sizes[i][leader_of(leader, (i, k))] += area.area
-                middles.setdefault((i, k), area.representative_point())
+                group = leader_of(leader, (i, k))
+                sizes[i][group] += area.area
+                middles.setdefault((i, group), area.representative_point())
     if not known and plan.start is None:
-        home = max(sum(sizes, Counter()).items(), key=lambda row: row[1], default=(None, 0.0))[0]
+        home = next((group for group, _ in sum(sizes, Counter[Face]()).most_common(1)), None)
     for i, groups in enumerate(sizes):
         for group, size in groups.items():
             if home is not None and group not in (home, *known) and size >= PART * groups.total():
-                at = next(at for (j, k), at in middles.items() if j == i and leader_of(leader, (i, k)) == group)
+                at = middles[i, group]
                 text = f"{size:.0f} m2 around here cannot be reached by doors, gaps, stairs or lifts"
                 yield PlanFinding("sealed", i, (at.x, at.y), text)
 
@@ -121,9 +122,7 @@ def narrowest_opening(segments: Floats, at_m: tuple[float, float]) -> tuple[floa
             opening = (free, WIDTHS_M[middle])
     if opening is None or opening[0] is None:
         return None
-    across = shapely.shortest_line(
-        *opening[0]
-    )  # from the room to the outside: through the opening that the thickness has closed
+    across = shapely.shortest_line(*opening[0])  # from the room to the outside: through the opening that is closed
     return None if across.intersects(walls) else (float(across.centroid.x), float(across.centroid.y), opening[1])
 
 

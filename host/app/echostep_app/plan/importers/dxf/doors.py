@@ -58,17 +58,14 @@ class PlacedDoors:
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
         """Place the doors of a symbol."""
-        lines = (
-            list(_lines(symbol, walls)) or list(_lines(symbol, walls.wider())) or list(_of_panels(symbol.lines, walls))
-        )
+        lines = _lines(symbol, walls) or _lines(symbol, walls.wider()) or [*_of_panels(symbol.lines, walls)]
         if not lines and not (symbol.swings or _is_long(symbol.lines)):
             self.marks += 1
         elif not lines:
             middle = shapely.union_all(symbol.lines).envelope.centroid
             self.strays.append(((round(middle.x, 2), round(middle.y, 2)), _drawn_line(symbol)))
         for line in _joined(lines):
-            width_m = math.dist(line[:2], line[2:])
-            if walls.gap(line[:2], _along(line), width_m / 2, width_m) is not None:
+            if _gap(line, walls) is not None:
                 self._place(line, walls)
             elif not self._has(line):
                 self._cut(line, walls)
@@ -85,7 +82,7 @@ class PlacedDoors:
         if len(closed) != 1 or not walls.is_at_wall(swing.hinge):
             return None
         line = (*swing.hinge, *closed[0])
-        if walls.gap(line[:2], _along(line), swing.radius_m / 2, swing.radius_m) is not None or self._has(line):
+        if _gap(line, walls) is not None or self._has(line):
             return None
         if swing.leaf is None:
             self.asked.append(line)
@@ -95,16 +92,16 @@ class PlacedDoors:
 
     def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
         """Place two swings that meet and lie on no layer of doors, if they fit a gap exactly; returns the gap or None."""
-        leaves = [_of_swing(_meeting(swing, symbol.swings), walls) for swing in symbol.swings]
-        lines = _joined([leaf for leaf in leaves if leaf is not None])
-        if len(symbol.swings) != 2 or None in leaves or len(lines) != 1:
+        leaves = _lines(symbol, walls)
+        lines = _joined(leaves)
+        if len(symbol.swings) != 2 or len(leaves) != 2 or len(lines) != 1:
             return None
-        width_m = math.dist(lines[0][:2], lines[0][2:])
-        gap = walls.gap(lines[0][:2], _along(lines[0]), width_m / 2, width_m)
-        if gap is None or abs(gap.begin_m) > BY_M or abs(gap.end_m - width_m) > BY_M:
+        (line,) = lines
+        gap = _gap(line, walls)
+        if gap is None or abs(gap.begin_m) > BY_M or abs(gap.end_m - math.dist(line[:2], line[2:])) > BY_M:
             return None
-        self._place(lines[0], walls)
-        return lines[0]
+        self._place(line, walls)
+        return line
 
     def _cut(self, line: Line, walls: WallBands) -> None:
         self.doors.append(Door(line))
@@ -142,16 +139,16 @@ class PlacedDoors:
             yield Question(THROUGH[line in self.asked], "door", at, (line,), is_proposed=line in self.asked)
 
 
-def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:
+def _lines(symbol: Symbol, walls: WallBands) -> list[Line]:
     """A line from jamb to jamb for each leaf of a symbol that hangs in a wall."""
-    for swing in symbol.swings:
-        line = _of_swing(_meeting(swing, symbol.swings), walls)
-        if line is not None:
-            yield line
-    if not symbol.swings:
-        line = _of_line(symbol.lines, walls)
-        if line is not None:
-            yield line
+    found = [_of_swing(_meeting(swing, symbol.swings), walls) for swing in symbol.swings]
+    return [line for line in (found if symbol.swings else [_of_line(symbol.lines, walls)]) if line is not None]
+
+
+def _gap(line: Line, walls: WallBands) -> Gap | None:
+    """The gap that a door's line lies in; None where a wall is drawn through it."""
+    width_m = math.dist(line[:2], line[2:])
+    return walls.gap(line[:2], _along(line), width_m / 2, width_m)
 
 
 def _drawn_line(symbol: Symbol) -> Line:
@@ -164,14 +161,11 @@ def _drawn_line(symbol: Symbol) -> Line:
 
 def _meeting(swing: Swing, swings: Sequence[Swing]) -> Swing:
     """A swing without a drawn leaf whose arc meets the other leaf's arc: both leaves are closed there."""
-    for k, end in enumerate(swing.ends):  # a leaf that swings both ways is drawn closed, with two arcs
-        same = (other for other in swings if other is not swing and math.dist(other.hinge, swing.hinge) < BY_M)
-        if any(math.dist(end, other) < BY_M for one in same for other in one.ends):
-            return replace(swing, leaf=1 - k)
-    if swing.leaf is None:
+    others = [other for other in swings if other is not swing]
+    same = [other for other in others if math.dist(other.hinge, swing.hinge) < BY_M]  # two arcs of a leaf drawn closed
+    for near in (same, others if swing.leaf is None else []):
         for k, end in enumerate(swing.ends):
-            others = (other_end for other in swings if other is not swing for other_end in other.ends)
-            if any(math.dist(end, other) < BY_M for other in others):
+            if any(math.dist(end, other) < BY_M for one in near for other in one.ends):
                 return replace(swing, leaf=1 - k)
     return swing
 
@@ -191,16 +185,13 @@ def _of_swing(swing: Swing, walls: WallBands) -> Line | None:
         return _line(hinge, u, gap.begin_m, gap.end_m)
     if (shut := _leaf_in_wall(swing, walls)) is not None:
         return shut
-    if (
-        swing.leaf is not None
-    ):  # the drawn leaf shows the closed end: in a larger hole, or in a wall drawn through the door
+    if swing.leaf is not None:  # it shows the closed end: in a larger hole, or in a wall drawn through the door
         u = towards[0]
         gap = walls.gap(hinge, u, radius / 2, BESIDE_M)
         if gap is not None and gap.begin_m >= -NEAR_M and gap.end_m < BESIDE_M and gap.width_m > radius:
             return _line(hinge, u, min(gap.begin_m, 0.0), radius)
-    through = [end for end in closed if walls.is_at_wall(hinge) and walls.is_at_wall(end)]
-    drawn_through = [end for end in through if walls.gap(hinge, _unit(hinge, end), radius / 2, radius) is None]
-    return (*hinge, *drawn_through[0]) if drawn_through else None
+    lines: list[Line] = [(*hinge, *end) for end in closed if walls.is_at_wall(hinge) and walls.is_at_wall(end)]
+    return next((line for line in lines if _gap(line, walls) is None), None)
 
 
 def _leaf_in_wall(swing: Swing, walls: WallBands) -> Line | None:
@@ -211,8 +202,8 @@ def _leaf_in_wall(swing: Swing, walls: WallBands) -> Line | None:
     (u, v) = _unit(swing.hinge, shut)
     goes_on = walls.is_at_wall(shut) and walls.is_at_wall((shut[0] + BEYOND_M * u, shut[1] + BEYOND_M * v))
     is_free = goes_on and not walls.is_at_wall(free)
-    is_walled = walls.gap(swing.hinge, (u, v), swing.radius_m / 2, swing.radius_m) is None
-    return (*swing.hinge, *shut) if is_free and is_walled else None
+    line = (*swing.hinge, *shut)
+    return line if is_free and _gap(line, walls) is None else None
 
 
 def _exact(swing: Swing, walls: WallBands) -> Line | None:

@@ -180,7 +180,8 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             )
         if hints.align or storey.window is not None:
             dx, dy = alignment(walls[k], walls[0])
-            storeys[k] = _moved(storey, dx, dy)
+            frame = replace(storey.frame, x0_m=storey.frame.x0_m - dx, y0_m=storey.frame.y0_m - dy)
+            storeys[k] = _Storey(storey.sheet, frame, storey.window and translate(storey.window, dx, dy))
         elif not over:
             one, other = (sheet.storey or sheet.file.name for sheet in (storey.sheet, first))
             report.doubt(f"{one} does not lie over {other}: --align lays the storeys over each other")
@@ -196,12 +197,6 @@ def _as_large(one: list[LineString], other: list[LineString]) -> bool:
     """Whether two levels are of about the same size: within a factor of 2."""
     sizes = [max(b[2] - b[0], b[3] - b[1]) for b in (bounds_of(one), bounds_of(other))]
     return max(sizes) < 2 * min(sizes)
-
-
-def _moved(storey: _Storey, dx: float, dy: float) -> _Storey:
-    frame = replace(storey.frame, x0_m=storey.frame.x0_m - dx, y0_m=storey.frame.y0_m - dy)
-    window = None if storey.window is None else translate(storey.window, dx, dy)
-    return _Storey(storey.sheet, frame, window)
 
 
 def _drawn_level(storey: _Storey, drawn: DrawnLevel, report: ImportReport) -> DrawnLevel:

@@ -195,14 +195,12 @@ def clipped(entity: Any, shown: BaseGeometry) -> list[Any]:
         return [entity] if at is None or shown.covers(Point(at.x, at.y)) else []
     if all(map(shown.covers, lines)):
         return [entity]
-    inside = [
-        part for line in lines for part in shapely.get_parts(line.intersection(shown)) if isinstance(part, LineString)
-    ]
     pieces = []
-    for part in inside:
-        piece: Any = factory.new("LWPOLYLINE", {"layer": entity.dxf.layer})
-        piece.append_points(list(part.coords), format="xy")
-        pieces.append(piece)
+    for part in shapely.get_parts([line.intersection(shown) for line in lines]):
+        if isinstance(part, LineString):
+            piece: Any = factory.new("LWPOLYLINE", {"layer": entity.dxf.layer})
+            piece.append_points(list(part.coords), format="xy")
+            pieces.append(piece)
     return pieces
 
 

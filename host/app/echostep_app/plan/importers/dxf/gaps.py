@@ -91,9 +91,8 @@ class WallBands:
         if not len(near):
             return None
         rows = (near.reshape(-1, 2, 2) - end) @ np.array([outward, (-outward[1], outward[0])]).T
-        rows = rows[
-            np.arange(len(rows))[:, None], np.argsort(rows[:, :, 0], axis=1)
-        ]  # each begins with its end nearer to the door
+        # Each begins with its end nearer to the door
+        rows = np.take_along_axis(rows, np.argsort(rows[:, :, :1], axis=1), axis=1)
         (begin, off), far = rows[:, 0].T, rows[:, 1]
         stops = (np.abs(begin) < STOP_M) & (far[:, 0] > STOP_M) & (np.abs(far[:, 1] - off) < 0.1 * (far[:, 0] - begin))
         return _faces(np.sort(off[stops]))

@@ -105,7 +105,20 @@ def _matched(names: list[Written], outlines: list[Polygon], texts: list[Written]
 
 
 def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
-    """Texts beneath each other, or in one block, as lines of one room's name; of these, smaller letters and measures are none."""
+    """Texts as lines of rooms' names; smaller letters and measures are none."""
+    rooms = []
+    for stamp in _beneath(texts):
+        least_m = SAME_HEIGHT * max(one.height_m for one in stamp)
+        large = [text for text in stamp if text.height_m >= least_m or PART.search(text.tag)]
+        lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
+        rooms.append(_joined(lines))
+        for text in stamp:
+            report.leave_out(text.what, text not in lines)
+    return rooms
+
+
+def _beneath(texts: Sequence[Written]) -> list[list[Written]]:
+    """Texts beneath each other, or in one block: the lines of each room's name."""
     texts = sorted(texts, key=lambda one: (-one.read_at()[1], one.read_at()[0]))
     places = shapely.points(np.array([text.room.at_m for text in texts]).reshape(-1, 2))
     tree, reach_m = shapely.STRtree(places), 2.0 * NEXT_LINE * max((text.height_m for text in texts), default=0.0)
@@ -117,15 +130,11 @@ def _stamps(texts: Sequence[Written], report: ImportReport) -> list[Room]:
         below = min(above, key=lambda stamp: stamp[-1].read_at()[1], default=[])
         stamps[k] = blocks.setdefault(text.block, below) if text.block else below
         stamps[k].append(text)
-    rooms = []
-    for stamp in {id(stamp): stamp for stamp in stamps.values()}.values():
-        least_m = SAME_HEIGHT * max(one.height_m for one in stamp)
-        large = [text for text in stamp if text.height_m >= least_m or PART.search(text.tag)]
-        lines = [text for text in large if text is large[0] or not MEASURE.match(text.room.name)]
-        rooms.append(Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m))
-        for text in stamp:
-            report.leave_out(text.what, text not in lines)
-    return rooms
+    return list({id(stamp): stamp for stamp in stamps.values()}.values())
+
+
+def _joined(lines: Sequence[Written]) -> Room:
+    return Room(" ".join(line.room.name for line in lines)[:80], lines[0].room.at_m)
 
 
 def _follows(text: Written, last: Written) -> bool:
@@ -156,7 +165,7 @@ def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
     lines = [text for text in words if text.height_m >= largest]
     for line in lines:
         report.take_back(line.what)
-    return _stamps(lines, report)
+    return [_joined(name) for name in _beneath(lines)]
 
 
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
@@ -164,7 +173,8 @@ def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
     kind = entity.dxftype()
     if kind not in TEXTS or (kind == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))):
         return None
-    lines = [line for line in entity.plain_text().replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
+    text = (kind == "ATTRIB" and entity.plain_mtext()) or entity.plain_text()
+    lines = [line for line in text.replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
     height = float(entity.dxf.get("char_height" if kind == "MTEXT" else "height", 0.0))
     try:

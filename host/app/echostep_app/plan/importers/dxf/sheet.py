@@ -33,12 +33,8 @@ from echostep_app.plan.importers.storey_names import StoreyName, storey_of
 MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed
 MOST_NAMES = 20  # of layers in an error
 MOST_STOREYS = 200  # over each other
-MOST_COMPARED, SAME = 6, 0.99  # layers of walls; share from which two are the same; assumed
-NAMED = ": another storey? End the names of its layers with _L1, those of the lower one with _L0: each is a level then"
-LEAST_STOREY_M, TOUCH_M = (
-    2.0,
-    0.05,
-)  # of a floor from the one below; of the head of a wall from what stands on it; assumed
+LEAST_STOREY_M = 2.0  # of a floor from the one below; assumed
+TOUCH_M = 0.05  # of the head of a wall from what stands on it; assumed
 Layered = list[tuple[Any, str]]  # entities with their layers
 
 
@@ -109,12 +105,9 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
         report.leave_out(what, count)
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
-    used_m = sum(line.length for line in _lines(sheet.walls, frame))
-    over = _over([layer for layer, _ in alike], sheet, frame) if alike else []
-    if over:
-        report.doubt(f"what looks like walls on {over[0]} lies over the walls used{NAMED}")
-    if not (alike := [row for row in alike if row[0] not in over]):
+    if not alike:
         return ()
+    used_m = sum(line.length for line in _lines(sheet.walls, frame))
     words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
     advice = _advice([*report.layers["walls"], *(name for name, _ in alike)][:6])
     if asks and sum(length for _, length in alike) > MOST_MORE * used_m:
@@ -134,9 +127,6 @@ def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
         by = "heights of walls"
         names, homes = _lifted(sheet, frame)
     if len(names) < 2:
-        layers = [layer for layer, _ in Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)]
-        for layer in _over(layers, sheet, frame)[-1:]:
-            report.doubt(f"what is on {layer} lies over the other walls{NAMED}")
         return [sheet]
     parts = [_part(sheet, homes, names, number) for number in sorted(names)]
     lines = [_lines(part.walls, frame) for part in parts]
@@ -144,9 +134,7 @@ def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
     if not any(drawn_over(low, high) for low, high in pairwise(lines)):
         report.doubt(f"{told}, but they do not lie over each other: taken as one level")
         return [sheet]
-    both = sorted(
-        {layer for row in sheet.kinds.values() for entity, layer in row if homes.get(id(entity)) not in names}
-    )
+    both = sorted({layer for row in sheet.kinds.values() for entity, layer in row if id(entity) not in homes})
     window = window_words([bounds_of([line for row in lines for line in row])], sheet.scale_m)
     on_all = f"; on all of them: {', '.join(both)[:99]}" if both else ""
     report.doubt(f"{told}, over each other: each is a level; {window} takes them as one{on_all}")
@@ -197,21 +185,6 @@ def _lifted(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int
     bases = [base for k, base in enumerate(bases) if has_room(_lines(on.get(k, []), frame))]
     pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row if len(bases) > 1]
     return {k: f"{base:g} m" for k, base in enumerate(bases)}, {id(entity): home(entity) for entity, _ in pairs}
-
-
-def _over(layers: Sequence[str], sheet: Sheet, frame: DrawingFrame) -> list[str]:
-    """Which layers look like another storey over the walls on other layers, though no word names it; the same walls, drawn and filled, are one."""
-    used = {layer for _, layer in sheet.kinds["walls"]}
-    lines: dict[str, list[LineString]] = {layer: [] for layer in (*used, *layers)}
-    for entity, layer in (*sheet.kinds["walls"], *sheet.others) if used - {*layers[:1]} else ():
-        if layer in lines:
-            lines[layer] += frame.raw(entity)
-    found = []
-    for layer in layers:
-        own, rest = lines[layer], [line for other in used - {layer} for line in lines[other]]
-        if storey_of(layer) is None and has_room(own) and has_room(rest) and drawn_over(own, rest, SAME):
-            found.append(layer)
-    return found
 
 
 def _lines(entities: Sequence[Any], frame: DrawingFrame) -> list[LineString]:

@@ -43,8 +43,7 @@ def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
 def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:
     """Number of lines outside the longest group of walls, and the group's rectangle (m): a frame, a title block, a north arrow."""
     lines = np.array(list(walls), dtype=object)
-    x0, y0, x1, y1 = shapely.total_bounds(lines)
-    around = np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0)
+    around = _around(lines)
     if around.all():
         return None
     groups = _groups(lines[~around], 0.5)
@@ -56,12 +55,16 @@ def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:
 
 def _is_border(lines: np.ndarray[Any, Any]) -> Bools:
     """Which lines (n,) frame all others, and touch none: the border of a sheet."""
-    x0, y0, x1, y1 = shapely.total_bounds(lines)
-    around = np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0)
+    around = _around(lines)
     if not around.any() or around.all():
         return np.zeros(len(lines), dtype=bool)
     apart = shapely.distance(shapely.union_all(lines[around]), shapely.multilinestrings(lines[~around]))
     return np.asarray(around & (apart > BORDER_M))
+
+
+def _around(lines: np.ndarray[Any, Any]) -> Bools:
+    x0, y0, x1, y1 = shapely.total_bounds(lines)
+    return np.asarray(np.abs(shapely.bounds(lines) - (x0, y0, x1, y1)).max(axis=1) < APART * max(x1 - x0, y1 - y0))
 
 
 def _groups(lines: np.ndarray[Any, Any], share: float) -> np.ndarray[Any, Any]:
@@ -93,14 +96,14 @@ def has_room(lines: Sequence[LineString] | np.ndarray[Any, Any]) -> bool:
     return any(part.interiors for part in shapely.get_parts(closed))
 
 
-def drawn_over(one: Sequence[LineString], other: Sequence[LineString], most: float = math.inf) -> bool:
-    """Whether walls are those of two storeys over each other: they cross well before their ends, or coincide, by up to the share `most`."""
+def drawn_over(one: Sequence[LineString], other: Sequence[LineString]) -> bool:
+    """Whether walls are those of two storeys over each other: they cross well before their ends, or coincide."""
     a, b = (shapely.linestrings(pieces_of(lines).reshape(-1, 2, 2)) for lines in (one, other))
     tree = shapely.STRtree(b)
     near = np.unique(tree.query(a, predicate="dwithin", distance=SAME_M)[1])
     bands = shapely.union_all(shapely.buffer(b[near], SAME_M, cap_style="flat"))
     shared_m = shapely.length(shapely.intersection(shapely.union_all(a), bands))
-    if COINCIDE < shared_m / min(shapely.length(shapely.union_all(walls)) for walls in (a, b)) < most:
+    if shared_m > COINCIDE * min(shapely.length(shapely.union_all(walls)) for walls in (a, b)):
         return True
     i, j = tree.query(a, predicate="crosses")
     at = shapely.intersection(a[i], b[j])

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -65,9 +66,8 @@ def is_swing(symbol: Symbol) -> bool:
 def draws_open_leaf(lines: Sequence[LineString], swing: Swing, closed: Point) -> bool:
     """Whether lines are no more than the leaf of a swing, drawn open; `closed`: the end of its arc that is at the jamb."""
     open_end = max(swing.ends, key=lambda end: math.dist(end, closed))
-    pieces = [LineString(pair) for line in lines for pair in _straight(line)]
     is_small = sum(line.length for line in lines) < MOST_LEAF * swing.radius_m
-    return is_small and any(_is_leaf(piece, swing.hinge, open_end) for piece in pieces)
+    return is_small and any(_is_leaf(piece, swing.hinge, open_end) for piece in _straight(lines))
 
 
 def symbols_of(lines: Sequence[LineString]) -> list[Symbol]:
@@ -147,24 +147,19 @@ def with_leaf(swing: Swing, lines: Sequence[LineString]) -> Swing:
 
     A threshold may also be drawn to the other end: then no end is chosen.
     """
-    straight = [LineString(pair) for line in lines for pair in _straight(line)]
-    reached = [k for k, end in enumerate(swing.ends) if any(_is_leaf(line, swing.hinge, end) for line in straight)]
+    straight = _straight(lines)
+    reached = [k for k, end in enumerate(swing.ends) if any(_is_leaf(piece, swing.hinge, end) for piece in straight)]
     return replace(swing, leaf=reached[0]) if len(reached) == 1 else swing
 
 
-def _is_leaf(line: LineString, hinge: Point, end: Point) -> bool:
-    a, b = line.coords
-    return min(_apart(a, hinge, b, end), _apart(b, hinge, a, end)) < LEAF_M
+def _is_leaf(piece: tuple[Point, Point], hinge: Point, end: Point) -> bool:
+    return any(max(math.dist(a, hinge), math.dist(b, end)) < LEAF_M for a, b in (piece, piece[::-1]))
 
 
-def _apart(a: Point, hinge: Point, b: Point, end: Point) -> float:
-    return max(math.dist(a, hinge), math.dist(b, end))
-
-
-def _straight(line: LineString) -> Iterator[tuple[Point, Point]]:
-    """The pieces of a polyline that are long enough for a leaf."""
-    points = [_point(p) for p in line.coords]
-    return ((a, b) for a, b in zip(points, points[1:], strict=False) if math.dist(a, b) > NARROWEST_M)
+def _straight(lines: Sequence[LineString]) -> list[tuple[Point, Point]]:
+    """The pieces of polylines that are long enough for a leaf."""
+    pieces = [pair for line in lines for pair in pairwise([_point(p) for p in line.coords])]
+    return [(a, b) for a, b in pieces if math.dist(a, b) > NARROWEST_M]
 
 
 def _point(values: Sequence[float] | Floats) -> Point:

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry import LineString, Point
 
 from echostep.errors import EchostepError
-from echostep.plan import ConnectorKind, Door, Georeference, Plan, Question
+from echostep.plan import ConnectorKind, Door, Georeference, Plan
 from echostep_app.plan.georeference import FAR_M, IN_GRID, EarthTransform
 from echostep_app.plan.importers.connector_shapes import plan_of
-from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, ring, room
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.map_conversion import map_georeference
@@ -31,10 +31,7 @@ from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
 AT_FACE_M, THICKEST_M = 0.1, 1.0  # of a door from the face of its wall; of a wall; assumed
-FILLED_M, FRAME_M = (
-    2.0,
-    0.3,
-)  # least width of a wall that fills a room; between a door's width and its opening's; assumed
+FRAME_M = 0.3  # between a door's width and its opening's; assumed
 FAR_DEG = 0.01  # of latitude: a kilometre
 CUT_M = 1.0  # height of the cut above the floor: about the rangers' height
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
@@ -54,7 +51,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     count = 0
     for body in shapes.bodies(standing(model, SEEN, report), report):
         count += 1
-        if why := _place(drawn_levels, body, report):
+        if why := _place(drawn_levels, body):
             report.leave_out(f"{body.element.is_a()} {why}")
     _doors(model, drawn_levels, shapes, report)
     _tell(model, report)
@@ -119,7 +116,7 @@ def _tell(model: Any, report: ImportReport) -> None:
             report.leave_out(element.is_a())
 
 
-def _place(drawn_levels: list[DrawnLevel], body: SolidBody, report: ImportReport) -> str:
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
     """Add an element to the levels that it is on; returns why it is on none, empty when it is on one."""
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
@@ -128,29 +125,13 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody, report: ImportReport
         return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
     levels = [drawn for drawn in drawn_levels if low <= drawn.height_m + CUT_M <= high]
     for drawn in levels:
-        full: list[Polygon] = []
         if kind in WALLS:
-            for area in body.cut(drawn.height_m + CUT_M):
-                is_full = kind == "IfcWall" and not area.buffer(-FILLED_M / 2).is_empty
-                (drawn.walls if not is_full else full).append(area)
+            drawn.walls += body.cut(drawn.height_m + CUT_M)
         elif kind == "IfcWindow":
             drawn.windows.append(body.above())
         else:
             drawn.rooms += [room(name or "room", area) for area in body.cut(drawn.height_m + CUT_M)]
-        drawn.questions += [_of_full_wall(name, area) for area in full]
-        report.leave_out("IfcWall that fills a room", len(full))
     return "" if levels else NO_STOREY
-
-
-def _of_full_wall(name: str, area: Polygon) -> Question:
-    """The question about a wall that fills a room, which was left out."""
-    corners = ring(area)
-    lines = np.concatenate((corners, np.roll(corners, -1, axis=0)), axis=1).tolist()
-    at = area.representative_point()
-    text = f"wall {name!r} fills {area.area:.1f} m2 and was left out: take it in?"
-    return Question(
-        text, "wall", (round(at.x, 3), round(at.y, 3)), tuple((a, b, c, d) for a, b, c, d in lines), is_proposed=True
-    )
 
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:

@@ -14,6 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from echostep.errors import EchostepError
 from echostep.fields import LIMIT_M
 from echostep_app.extras import require
@@ -91,20 +93,16 @@ def _heights_m(storeys: list[Any], scale_m: float, report: ImportReport) -> list
     stated = [height - shift[0] + shift[1] for height in stated]
     if max(abs(one - other) for one, other in zip(placed, stated, strict=True)) < DIFFERENT_M:
         return placed
-    nearer = 0
+    nearer, words = 0.0, []
     for storey, one, other in zip(storeys, placed, stated, strict=True):
-        for element in (element for relation in storey.ContainsElements for element in relation.RelatedElements):
-            if element.ObjectPlacement:
-                z_m = float(util.get_local_placement(element.ObjectPlacement)[2][3]) * scale_m
-                nearer += (abs(z_m - other) < abs(z_m - one)) - (abs(z_m - one) < abs(z_m - other))
-    words = ", ".join(
-        f"{s.Name or 'storey'} {one:.2f}/{other:.2f} m" for s, one, other in zip(storeys, placed, stated, strict=True)
-    )
-    taken = "Elevation" if nearer > 0 else "placement"
-    report.doubt(
-        f"storeys' placement and Elevation differ ({words[:150]}): {taken} is taken, as more of their contents lie there"
-    )
-    return stated if nearer > 0 else placed
+        words.append(f"{storey.Name or 'storey'} {one:.2f}/{other:.2f} m")
+        for place in (element.ObjectPlacement for element in _contained(storey) if element.ObjectPlacement):
+            z_m = float(util.get_local_placement(place)[2][3]) * scale_m
+            nearer += np.sign(abs(z_m - one) - abs(z_m - other))
+    taken, heights = ("Elevation", stated) if nearer > 0 else ("placement", placed)
+    told = f"storeys' placement and Elevation differ ({', '.join(words)[:150]})"
+    report.doubt(f"{told}: {taken} is taken, as more of their contents lie there")
+    return heights
 
 
 def _without_references(storeys: list[Storey], report: ImportReport) -> list[Storey]:
@@ -129,9 +127,12 @@ def _without_references(storeys: list[Storey], report: ImportReport) -> list[Sto
 
 def _contents(storey: Any) -> int:
     """How many elements of a building a storey contains."""
-    contained = [e for relation in storey.ContainsElements for e in relation.RelatedElements]
     spaces = [e for relation in storey.IsDecomposedBy for e in relation.RelatedObjects]
-    return sum(any(element.is_a(kind) for kind in CONTENTS) for element in (*contained, *spaces))
+    return sum(any(element.is_a(kind) for kind in CONTENTS) for element in (*_contained(storey), *spaces))
+
+
+def _contained(storey: Any) -> list[Any]:
+    return [element for relation in storey.ContainsElements for element in relation.RelatedElements]
 
 
 def standing(model: Any, kinds: Iterable[str], report: ImportReport) -> Iterator[Any]:

@@ -107,18 +107,21 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
     if not levels:
         raise EchostepError(f"{path}: {_file(archive, 'level')}: it has no levels: export the archive with its levels")
-    drawn_levels = _drawn_levels(levels, storey_height_m, report)
+    drawn_levels = {
+        level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
+        for level in levels
+    }
     openings = _by_level(_features(archive, "opening", earth), drawn_levels, report)
     units = _by_level(_features(archive, "unit", earth), drawn_levels, report)
     if not any(units.values()):
         raise EchostepError(f"{path}: {_file(archive, 'unit')}: no units on these levels: export all files again")
-    order = list({id(drawn): drawn for drawn in drawn_levels.values()}.values())
     for key, drawn in drawn_levels.items():
         if doors_m is None:
             report.leave_out(
                 "opening without a width (--doors 0.9 gives one)", sum(not _doors(one) for one in openings[key])
             )
-        _outline(drawn, next(level for level in levels if level.key == key))
+        inside = [one.shape for one in levels if one.key == key and one.about.get("outdoor") is not True]
+        drawn.walls += [area.boundary for area in areas(inside)]
         for unit in units[key]:
             _unit(drawn, unit, [one.shape for one in openings[key]])
         _place_doors(drawn, openings[key], report)
@@ -133,35 +136,10 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
                 report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
             else:
                 report.leave_out(f"fixture {fixture.category}")
-    place = {id(drawn): k for k, drawn in enumerate(order)}
-    numbered = {unit.key: (place[id(drawn)], unit) for key, drawn in drawn_levels.items() for unit in units[key]}
-    _relationships(archive, earth, numbered, order, report)
+    numbered = {unit.key: (k, unit) for k, key in enumerate(drawn_levels) for unit in units[key]}
+    _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
-    return plan_of(name, order, report, georeference)
-
-
-def _drawn_levels(levels: list[Feature], storey_height_m: float, report: ImportReport) -> dict[str, DrawnLevel]:
-    """Levels by their ids, the lowest first; those of one ordinal beside each other, as of several buildings, are one."""
-    groups: list[list[Feature]] = []
-    for level in levels:
-        beside = (
-            g
-            for g in groups
-            if _ordinal(g[0]) == _ordinal(level) and not any(level.shape.intersects(one.shape) for one in g)
-        )
-        if (group := next(beside, None)) is None:
-            groups.append(group := [])
-        group.append(level)
-    drawn_levels: dict[str, DrawnLevel] = {}
-    for group in groups:
-        ordinal, names = _ordinal(group[0]), dict.fromkeys(level.name for level in group if level.name)
-        drawn = DrawnLevel(", ".join(names)[:80] or f"level {ordinal:g}", round(ordinal * storey_height_m, 6))
-        drawn_levels |= {level.key: drawn for level in group}
-    if shared := [", ".join(level.name or level.key for level in group) for group in groups if group[1:]]:
-        report.doubt(
-            f"levels of one ordinal beside each other, as of several buildings, are one level: {'; '.join(shared)[:99]}"
-        )
-    return drawn_levels
+    return plan_of(name, list(drawn_levels.values()), report, georeference)
 
 
 def _file(archive: Archive, kind: str) -> str:
@@ -282,12 +260,6 @@ def _onto(line: Line, wall: BaseGeometry, middle: Point) -> Line:
     if np.hypot(*(moved[1] - moved[0])) < ALONG * np.hypot(*(ends[1] - ends[0])):
         return line
     return float(moved[0, 0]), float(moved[0, 1]), float(moved[1, 0]), float(moved[1, 1])
-
-
-def _outline(drawn: DrawnLevel, level: Feature) -> None:
-    """The outline of a level becomes a wall, unless the level is outdoors."""
-    if level.about.get("outdoor") is not True:
-        drawn.walls += [area.boundary for area in areas([level.shape])]
 
 
 def _unit(drawn: DrawnLevel, unit: Feature, openings: list[BaseGeometry]) -> None:

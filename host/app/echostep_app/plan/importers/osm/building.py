@@ -206,19 +206,22 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
             continue
         odd += [f"node {node}: width={tags['width'][:20]}"] if "width" in tags and not _metres(tags, 0.0) else []
         own, through = levels_of(tags, f"node {node}"), elements.through(node)
-        ground += [f"node {node}"] if not own and through in site.outside else []
-        own = own or _levels_at(site, through)
+        entrance = f"{tags['entrance']} entrance" if tags.get("entrance", "no") != "no" else ""
+        is_ground = not own and (entrance != "" or through in site.outside)
+        own = own or _levels_at(site, through, is_ground=is_ground)
         wide_m, at_m = _metres(tags, DOOR_M), elements.at_m[node]
         gaps = {level: _gap(walls[level], trees[level], at_m, wide_m) for level in own if level in walls}
         lost += [] if any(gaps.values()) else [f"node {node}"]
+        ground += [f"node {node}"] if is_ground and any(gaps.values()) else []
         for level, gap in gaps.items():
             if gap is not None and gap not in lines[level]:
                 lines[level].add(gap)
-                entrance = f"{tags['entrance']} entrance" if tags.get("entrance", "no") != "no" else ""
                 name = (tags.get("name") or tags.get("ref") or entrance)[:80]
                 site.drawn_levels[level].doors.append(Door(gap, _state(tags), name))
     if ground:
-        report.doubt(f"doors without level on outlines are on the ground ({', '.join(ground[:5])}): tag level=*")
+        report.doubt(
+            f"doors without level on outlines, and entrances, are on the ground ({', '.join(ground[:5])}): tag level=*"
+        )
     if odd:
         report.doubt(
             f"{len(odd)} doors were taken as {DOOR_M:g} m wide ({', '.join(odd[:3])}): write it in metres, as width=0.9, or with its unit"
@@ -228,10 +231,10 @@ def _doors(site: OsmSite, elements: Elements, report: ImportReport) -> None:
         report.doubt(f"doors on no wall were left out ({', '.join(lost[:5])}): corridors and areas have no walls")
 
 
-def _levels_at(site: OsmSite, node: int) -> list[float]:
-    """Levels of a door without a level: of the indoor elements through its node; on an outline only the lowest from 0 up."""
+def _levels_at(site: OsmSite, node: int, *, is_ground: bool) -> list[float]:
+    """Levels of a door without a level: of the indoor elements through its node; on the ground only the lowest from 0 up."""
     levels = sorted(site.levels_at.get(node) or site.outside.get(node) or site.order)
-    return [min(levels, key=lambda level: (level < 0, abs(level)))] if node in site.outside else levels
+    return [min(levels, key=lambda level: (level < 0, abs(level)))] if is_ground else levels
 
 
 def _gap(

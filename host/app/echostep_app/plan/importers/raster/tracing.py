@@ -66,9 +66,8 @@ def trace(walls: Bools, path: Path) -> tuple[list[Polygon], int]:
     boxes = shapely.box(first, height - rows - 1, last, height - rows)
     groups = [part for part in shapely.get_parts(shapely.union_all(boxes)) if isinstance(part, Polygon)]
     large = [group for group in groups if group.area >= LEAST_PIXELS]
-    smooth = [
-        group.normalize().simplify(STAIR) for group in large
-    ]  # a normalised ring begins at a corner: its beginning stays
+    # A normalised ring begins at a corner: its beginning stays
+    smooth = [group.normalize().simplify(STAIR) for group in large]
     return [s if isinstance(s, Polygon) and s.area > 0.0 else g for s, g in zip(smooth, large, strict=True)], len(
         groups
     ) - len(large)
