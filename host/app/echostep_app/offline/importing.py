@@ -21,7 +21,7 @@ from echostep.board.calibration import ADIS16100_RAD_S, MOST_AHEAD_DEG, SPEED_OF
 from echostep.board.frames import encode
 from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID, Gyros, Outcome, Ping, Pressure, Ranger
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import column_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import column_of, lines_of, open_samples
 from echostep.offline.imu_csv import LIMITS, Imu
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import imu_settings, parse_settings, read_settings
@@ -156,5 +156,4 @@ def _read_columns(file: TextIO, names: tuple[str, ...], required: int) -> Floats
     columns = [column_of(head.names, name) for name in names]
     if -1 in columns:
         raise ValueError(f"expected the columns {','.join(names)}; there are {', '.join(head.names)[:300]}")
-    rows = read_rows(lines, (head.names, head.separator), columns, required, LIMITS, head.line + 1)
-    return head.in_si(rows.values, names)
+    return head.in_si(head.rows(lines, columns, required, LIMITS).values, names)

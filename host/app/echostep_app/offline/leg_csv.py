@@ -20,7 +20,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import CsvLimits, column_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, column_of, lines_of, open_samples
 from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time, time_complaint
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_app.offline.leg_gyros import find_clipping_limits, repair_clipping, walking_axis
@@ -105,7 +105,7 @@ def _table(file: TextIO, prefix: str, naming: Naming) -> tuple[Floats, tuple[str
         )
     wanted = [name for source in sources for name in source]
     columns = [column_of(header, name) for name in (*wanted, *OPTIONAL)]
-    rows = read_rows(lines, (header, head.separator), columns, len(wanted), CsvLimits(), head.line + 1)
+    rows = head.rows(lines, columns, len(wanted), CsvLimits())
     named = [prefix + name if prefix + name in head.names else name for name in (*wanted, *OPTIONAL)]
     values = head.in_si(rows.values, named)
     series, notes, at = [], [], 0

@@ -18,7 +18,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError, replaced
-from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, lines_of, separator_of
+from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, header_of, is_comment, lines_of
 
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 # Format of the RGB-D SLAM benchmark of TUM, written by evo and others
@@ -78,11 +78,6 @@ class CsvColumns:
         return value
 
 
-def is_comment(line: str) -> bool:
-    """Whether a line is words after a #, neither names of columns nor of a TUM trajectory's."""
-    return line.lstrip().startswith("#") and not any(mark in line for mark in SEPARATORS) and not is_tum(line)
-
-
 def is_tum(first: str) -> bool:
     """Whether the first line belongs to a TUM trajectory: eight names or numbers with spaces in between."""
     return not any(mark in first for mark in SEPARATORS) and len(first.lstrip("# ").split()) == len(TUM)
@@ -112,13 +107,13 @@ def read_csv(path: Path) -> CsvColumns:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = lines_of(file, CsvLimits())
             comments = 0
-            while is_comment(first := next(lines, "")):
+            while is_comment(first := next(lines, "")) and not is_tum(first):
                 comments += 1
             if is_tum(first):
                 names, read = _read_tum(first, lines, comments + 1)
             else:
-                delimiter = separator_of(first)
-                names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
+                titles, delimiter = header_of(first.lstrip("# "))
+                names = tuple(titles)
                 reader = csv.reader(lines, delimiter=delimiter)
                 rows = (
                     (reader.line_num + 1 + comments, tuple(cell.strip() for cell in row)) for row in reader if any(row)

@@ -54,6 +54,11 @@ def header_of(first_line: str) -> tuple[list[str], str]:
     return [name.strip().strip('"') for name in next(csv.reader([first_line], delimiter=separator), [""])], separator
 
 
+def is_comment(line: str) -> bool:
+    """Whether a line above the names of the columns is words after a #, and not these names."""
+    return line.lstrip().startswith("#") and (":" in line or not any(mark in line for mark in SEPARATORS))
+
+
 def column_of(header: Sequence[str], name: str) -> int:
     """Index of the column of this name, -1 where the file lacks it; raises ValueError when it has two."""
     if header.count(name) > 1:
@@ -133,11 +138,16 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
     """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
     if range_hz[0] <= rate <= range_hz[1]:
         return ""
-    for unit, option, factor in TIME_UNITS:
-        if range_hz[0] <= rate * factor <= range_hz[1]:
-            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
+    if likely := unit_of_times(rate, range_hz):
+        unit, option, factor = likely
+        return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
     advice = too_slow if rate < range_hz[0] else too_fast
     return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
+
+
+def unit_of_times(rate: float, range_hz: tuple[float, float]) -> tuple[str, str, float] | None:
+    """The unit in which times of this rate (Hz, as if they were seconds) are within the range: its name, option, and how many make a second."""
+    return next((unit for unit in TIME_UNITS if range_hz[0] <= rate * unit[2] <= range_hz[1]), None)
 
 
 def number_of(text: str) -> float:

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.offline.csv_table import header_of
+from echostep.offline.csv_table import CsvLimits, CsvTable, header_of, read_rows
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """`names` of the columns, this project's where they are known; `line`: their line in the file; `factors` to SI by name.
+    """`names` of the columns, this project's where they are known; `line`: of the file, above the first row; `factors` to SI by name.
 
     `counts_hz`: counts a second, if `t_s` is a counter, which wraps after `counts_period`. `notes`: which logger was recognised.
-    `advice`: for a file that lacks a column.
+    `advice`: for a file that lacks a column. `begin`: the first lines of numbers, which were read to know the units.
     """
 
     names: list[str]
@@ -31,6 +32,12 @@ class Header:
     counts_period: int = 1
     notes: tuple[str, ...] = ()
     advice: str = ""
+    begin: tuple[str, ...] = ()
+
+    def rows(self, lines: Iterator[str], columns: Sequence[int], required: int, limits: CsvLimits) -> CsvTable:
+        """Rows of `begin` and of the lines after it, as `read_rows` has them."""
+        begun = chain(self.begin, lines)
+        return read_rows(begun, (self.names, self.separator), columns, required, limits, self.line + 1)
 
     def in_si(self, values: Floats, names: Sequence[str]) -> Floats:
         """Columns (n, k) of these names in SI units."""

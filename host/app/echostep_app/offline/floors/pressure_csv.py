@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint
 from echostep_app.offline import foreign_columns
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 
@@ -81,7 +81,7 @@ def _table(lines: Iterator[str], naming: Naming) -> tuple[Floats, Ints, tuple[st
     if twice := [name for name in wanted if header.count(name) > 1]:
         raise ValueError(f"line 1: column {twice[0]} is there twice")
     columns = [header.index(name) if name in header else -1 for name in wanted]
-    table = read_rows(lines, (header, head.separator), columns, len(COLUMNS), LIMITS, head.line + 1)
+    table = head.rows(lines, columns, len(COLUMNS), LIMITS)
     if len(table.line) < 2:
         raise ValueError("no samples: two rows at least are needed under the names of the columns")
     return head.in_si(table.values, wanted), table.line, head.notes

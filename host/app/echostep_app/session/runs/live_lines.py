@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.offline.csv_table import CsvLimits, column_of, number_of, read_rows
+from echostep.offline.csv_table import CsvLimits, column_of, number_of
 from echostep.offline.header import Header
 from echostep.offline.imu_csv import COLUMNS
 from echostep.ports.chunks import Chunk
@@ -57,7 +57,7 @@ class LineReader:
         if self._columns is None:
             return None
         head, columns = self._columns
-        rows = read_rows(iter([line]), (head.names, head.separator), columns, 0, CsvLimits(early_rows=None))
+        rows = head.rows(iter([line]), columns, 0, CsvLimits(early_rows=None))
         values = head.in_si(rows.values, COLUMNS)
         return values if (np.abs(values) < MOST).all() else None
 
