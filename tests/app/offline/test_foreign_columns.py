@@ -192,7 +192,6 @@ def axes(*names: str) -> str:
     (f"#timestamp [ns],{axes('a_RS_S_{} [m s^-2]', 'w_RS_S_{} [rad s^-1]')}", (1e9, 1, 1)),
     (f'"sep=,"\nS_B5_Timestamp_Unix_CAL,{axes("S_B5_Accel_WR_{}_CAL", "S_B5_Gyro_{}_CAL", "S_B5_Accel_LN_{}_CAL")}\n'
      "ms,m/(s^2),m/(s^2),m/(s^2),deg/s,deg/s,deg/s,g,g,g", (1e3, 1, 180 / np.pi)),
-    (f"# made by: a logger, at 100 Hz\n// Update Rate: 100.0Hz\n\ncount,{axes('acc_{} (g)', 'gyro_{}')}", (100, 1 / G, 1)),
 ])  # fmt: skip
 def test_the_options_that_a_file_needs_are_proposed_by_its_titles(
     titles: str, factors: tuple[float, ...], table: np.ndarray, tmp_path: Path

@@ -40,6 +40,7 @@ UNITS = {
     "rad/s": ("rate", 1.0), "deg/s": ("rate", np.pi / 180.0),
     "rad": ("angle", 1.0), "deg": ("angle", np.pi / 180.0),
     "Pa": ("pressure", 1.0), "hPa": ("pressure", 100.0), "kPa": ("pressure", 1000.0),
+    "bar": ("pressure", 1e5), "mmHg": ("pressure", 133.322), "inHg": ("pressure", 3386.39),
 }  # fmt: skip
 QUANTITIES = {"t_s": "time", "pressure_pa": "pressure", "compass_rad": "angle"} | {
     f"a{axis}": "force" for axis in "xyz"
@@ -132,10 +133,7 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     """The names of the columns, taken from the lines with all lines above them; raises ValueError for missing names."""
     above, text = _preamble(lines)
     begin, line, (theirs, separator) = [*islice(lines, BEGIN)], len(above) + 1, _titles(text, above)
-    titled = theirs
-    if units_row := _units_row(begin, separator):
-        pairs = zip_longest(theirs, units_row[: len(theirs)], fillvalue="")
-        titled = [f"{title} [{unit}]" if unit else title for title, unit in pairs]
+    if (titled := _titled(theirs, begin[:1], separator)) != theirs:
         begin, line = begin[1:], line + 1
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
@@ -161,11 +159,12 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     return Header(names, separator, line, factors, counts_hz, period, notes, advice, tuple(begin))
 
 
-def _units_row(begin: list[str], separator: str) -> list[str]:
-    """Cells of a row of units beneath the names of the columns; empty where the first row is another one."""
-    cells = [cell.strip() for cell in next(csv.reader(begin[:1], delimiter=separator), [])]
+def _titled(theirs: list[str], row: list[str], separator: str) -> list[str]:
+    """Titles of the columns with their units, if the first row beneath them is one of units."""
+    cells = [cell.strip() for cell in next(csv.reader(row, delimiter=separator), [])]
     is_row = any(map(_unit, cells)) and all(np.isnan(number_of(cell)) for cell in cells)
-    return cells if is_row else []
+    pairs = zip_longest(theirs, cells[: len(theirs)], fillvalue="")
+    return [f"{title} [{unit}]" if is_row and unit else title for title, unit in pairs]
 
 
 def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:
@@ -324,11 +323,10 @@ def proposal(titles: Sequence[str], titled: Sequence[str], first: Callable[[str]
 
 
 def _unit_of(times: Floats) -> str:
-    """The unit of the first times (n, 1) of a file by their rate; empty for seconds, and for a rate of no unit."""
+    """The unit of the first times (n, 1) of a file by their rate; empty for a rate of no unit."""
     times = times[np.isfinite(times)]
     rate = (len(times) - 1) / max(float(np.ptp(times)), 1e-12) if len(times) > 1 else 0.0
-    likely = None if RATE_RANGE_HZ[0] <= rate <= RATE_RANGE_HZ[1] else unit_of_times(rate, RATE_RANGE_HZ)
-    return likely[1] if likely else ""
+    return unit_of_times(rate, RATE_RANGE_HZ)[1]
 
 
 def _common(names: Sequence[str]) -> set[str]:

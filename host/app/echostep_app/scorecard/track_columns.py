@@ -23,20 +23,7 @@ from echostep.plan import Plan
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 
 NAMES = {
-    "time": (
-        "t_s",
-        "t",
-        "time_s",
-        "time",
-        "timestamp_s",
-        "timestamp",
-        "time_ms",
-        "timestamp_ms",
-        "t_ms",
-        "time_ns",
-        "timestamp_ns",
-        "t_ns",
-    ),
+    "time": tuple(f"{word}{unit}" for unit in ("_s", "", "_ms", "_us", "_ns") for word in ("t", "time", "timestamp")),
     "x": ("x_m", "x", "east_m", "east", "pos_x", "tx", "p_rs_r_x [m]"),
     "y": ("y_m", "y", "north_m", "north", "pos_y", "ty", "p_rs_r_y [m]"),
     "height": ("z_m", "z", "height_m", "height", "pos_z", "tz", "p_rs_r_z [m]"),
@@ -80,9 +67,8 @@ class ScoredPath:
     def described(self) -> str:
         """The columns that were used, in words."""
         units = {"time": "" if self.time_unit == "s" else f" in {self.time_unit}"}
-        return f"{self.path}: " + ", ".join(
-            f"{what} is {name}{units.get(what, '')}" for what, name in self.columns.items()
-        )
+        used = ", ".join(f"{what} is {name}{units.get(what, '')}" for what, name in self.columns.items())
+        return f"{self.path}: {used}"
 
 
 def load_path(path: Path, plan: Plan | None) -> ScoredPath:
@@ -149,9 +135,7 @@ def _levels(table: CsvColumns, name: str | None, height_m: Floats | None, plan: 
     if name is not None:
         index = {level.name: k for k, level in enumerate(plan.levels)} if plan else {}
         return np.array([_level(table, k, name, text, index.get) for k, text in enumerate(table.texts(name))])
-    if plan is None:
-        return None
-    return levels_at(height_m, len(table.rows), plan)
+    return levels_at(height_m, len(table.rows), plan) if plan else None
 
 
 def levels_at(height_m: Floats | None, rows: int, plan: Plan) -> Floats | None:

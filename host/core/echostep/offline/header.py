@@ -13,7 +13,7 @@ from itertools import chain
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.offline.csv_table import CsvLimits, CsvTable, header_of, read_rows
+from echostep.offline.csv_table import CsvLimits, CsvTable, column_of, header_of, read_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +34,15 @@ class Header:
     advice: str = ""
     begin: tuple[str, ...] = ()
 
-    def rows(self, lines: Iterator[str], columns: Sequence[int], required: int, limits: CsvLimits) -> CsvTable:
-        """Rows of `begin` and of the lines after it, as `read_rows` has them."""
-        begun = chain(self.begin, lines)
-        return read_rows(begun, (self.names, self.separator), columns, required, limits, self.line + 1)
-
-    def in_si(self, values: Floats, names: Sequence[str]) -> Floats:
-        """Columns (n, k) of these names in SI units."""
-        scaled: Floats = values * [self.factors.get(name, 1.0) for name in names]
+    def table(self, lines: Iterator[str], names: Sequence[str], required: int, limits: CsvLimits) -> CsvTable:
+        """Columns of these names in SI units, of `begin` and of the lines after it, as `read_rows` has them; NaN for a column that is not there."""
+        head, columns = (self.names, self.separator), [column_of(self.names, name) for name in names]
+        rows = read_rows(chain(self.begin, lines), head, columns, required, limits, self.line + 1)
+        scaled: Floats = rows.values * [self.factors.get(name, 1.0) for name in names]
         if self.counts_hz is not None:
             time = list(names).index("t_s")
-            scaled[:, time] = since_first(values[:, time], self.counts_period) / self.counts_hz
-        return scaled
+            scaled[:, time] = since_first(rows.values[:, time], self.counts_period) / self.counts_hz
+        return CsvTable(scaled, rows.line)
 
 
 HeaderReader = Callable[[Iterator[str]], Header]  # takes the lines up to the names of the columns
