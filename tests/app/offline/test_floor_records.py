@@ -147,11 +147,6 @@ def test_a_building_under_pressure_is_no_storey() -> None:
         levels(samples)
 
 
-def test_a_storey_that_vanishes_is_told() -> None:
-    with pytest.raises(EchostepError, match="one storey only"):
-        levels(record(walk([(0.0, 90.0), (1.5, 9.0), (1.5, 90.0)], 5.0), 5.0))
-
-
 def test_rows_with_the_time_of_the_row_before_are_skipped(tmp_path: Path) -> None:
     """Loggers write the last pressure again when there is no new one."""
     samples = record(walk(UP_AND_DOWN, 5.0), 5.0)

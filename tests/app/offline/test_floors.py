@@ -177,7 +177,7 @@ def test_wrong_units_are_named(tmp_path: Path, factor: float, seconds: float, wo
         ("t_s,pressure_pa\n0,101325\n1,101325\n2,101325\n", "never changes"),
         ("t_s,pressure_pa\n5,101325\n4,101320\n3,101325\n2,101326\n", "line 3: t_s does not advance"),
         ("t_s,pressure_pa\n0,101325\n3,101320\n6,101325\n", "is it in seconds"),
-        ("t_s,t_s,pressure_pa\n0,0,1\n", "twice"),
+        ("t_s,t_s,pressure_pa\n0,0,1\n", "two columns are named t_s"),
         ("t_s,pressure_pa\n" + "7" * 2000, "longer than"),
     ],
 )

@@ -71,9 +71,16 @@ def test_an_export_of_mt_manager_counts_samples_and_the_counter_wraps(
     header = "\t".join(["PacketCounter", *titles("Acc_{}", "Gyr_{}", "XYZ")])
     path = write(tmp_path / "MT_00.txt", header, np.column_stack([counter, table[:, 1:7]]), "\t", above)
     assert same(path, table) == ("read as an export of MT Manager",)
-    write(path, header, np.column_stack([counter, table[:, 1:7]]), "\t")
-    with pytest.raises(EchostepError, match=r"MT_00\.txt: PacketCounter counts samples, and no line .*Update Rate"):
+    write(path, f"{header}\tSampleTimeFine", np.column_stack([counter, table[:, 1:7], np.nan * counter]), "\t")
+    with pytest.raises(EchostepError, match=r"MT_00\.txt: PacketCounter counts samples, .*Update Rate.*Fine is empty"):
         load_foot(path)
+
+
+def test_an_export_of_picoquake_counts_samples_at_the_rate_above(table: np.ndarray, tmp_path: Path) -> None:
+    above = "# PLab PicoQuake Data\n# Time: 2024-05-06, Device: A\n# Config: data_rate = 100.0 Hz, filter = 42 Hz\n\n"
+    rows = np.column_stack([1 + np.arange(len(table)), table[:, 1:4] / G, np.degrees(table[:, 4:7])])
+    path = write(tmp_path / "a.csv", "count," + ",".join(titles("a_{}", "g_{}", "xyz")), rows, above=above)
+    assert same(path, table) == ("read as an export of PicoQuake",)
 
 
 DOT_ABOVE = (
@@ -149,9 +156,23 @@ def test_what_does_not_fit_is_one_line_that_names_it(
     assert done.stderr.count("\n") == 1
 
 
+def test_a_counter_without_a_rate_is_asked_about(table: np.ndarray, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", f"count,{axes('acc_{}', 'gyro_{}')}", table * [100, 1, 1, 1, 1, 1, 1])
+    asked = echostep("foot", path, cwd=tmp_path, ends=2).stderr
+    options = shlex.split(asked.partition("by their titles: ")[2])
+    assert "no line '// Update Rate: 100.0Hz' says how many" in asked
+    assert "no line '// Update Rate" in echostep("foot", path, *options, cwd=tmp_path, ends=2).stderr
+    path.write_text(f"// Update Rate: 100.0Hz\n{path.read_text()}")
+    assert "6 steps" in echostep("foot", path, *options, cwd=tmp_path, ends=0).stdout
+
+
 def test_a_stated_unit_is_believed_or_asked_about(table: np.ndarray, tmp_path: Path) -> None:
     units = [1e3, 1 / G, 1, 1e3 / G, 180 / np.pi, 180 / np.pi, 1]
-    same(write(tmp_path / "a.csv", "t (msec),ax (G),ay (m/s/s),az (mg),gx (dps),gy (deg/sec),gz", table * units), table)
+    for titles in (
+        "t (msec),ax (G),ay (m/s/s),az (mg),gx (dps),gy [deg/s],gz",
+        "t_s,ax,ay,az,gx,gy,gz\nms,g,,mg,dps,deg/s,",
+    ):
+        assert not same(write(tmp_path / "a.csv", titles, table * units), table)
     for title in ("gx (rpm)", "gx (rev/s)", "gx (deg)", "ax (LSB)", "t (min)"):
         path = write(tmp_path / "b.csv", f"time,{title}", np.zeros((9, 2)))
         with pytest.raises(EchostepError, match=r"b\.csv: .*: its unit is none of"):
@@ -167,13 +188,16 @@ def axes(*names: str) -> str:
     (f"time,{axes('Acc{}', 'w{} (deg/s)')}", (1, 1, 180 / np.pi)),
     (f"time_us,{axes('accelerometer_{}', 'gyroscope_{}')}", (1e6, 1, 1)),
     (f"time,{axes('acc_{}_g', 'gyro_{}_dps')},{axes('LinAcc{}', 'Mag{}')}", (1, 1 / G, 180 / np.pi)),
-    (f"%time,{axes('field.linear_acceleration.{}', 'field.angular_velocity.{}')}", (1, 1, 1)),
+    (f"field.header.stamp,{axes('field.linear_acceleration.{}', 'field.angular_velocity.{}')},%time", (1e9, 1, 1)),
+    (f"#timestamp [ns],{axes('a_RS_S_{} [m s^-2]', 'w_RS_S_{} [rad s^-1]')}", (1e9, 1, 1)),
+    (f'"sep=,"\nS_B5_Timestamp_Unix_CAL,{axes("S_B5_Accel_WR_{}_CAL", "S_B5_Gyro_{}_CAL", "S_B5_Accel_LN_{}_CAL")}\n'
+     "ms,m/(s^2),m/(s^2),m/(s^2),deg/s,deg/s,deg/s,g,g,g", (1e3, 1, 180 / np.pi)),
 ])  # fmt: skip
 def test_the_options_that_a_file_needs_are_proposed_by_its_titles(
     titles: str, factors: tuple[float, ...], table: np.ndarray, tmp_path: Path
 ) -> None:
     scale = np.repeat(factors, (1, 3, 3))
-    rows = np.hstack([table * scale, np.zeros((len(table), titles.count(",") - 6))])
+    rows = np.hstack([table * scale, np.zeros((len(table), titles.splitlines()[-1].count(",") - 6))])
     path = write(tmp_path / "a.csv", titles, rows)
     refused = echostep("foot", path, cwd=tmp_path)
     assert refused.returncode == 2
@@ -186,6 +210,7 @@ def test_the_options_that_a_file_needs_are_proposed_by_its_titles(
 @pytest.mark.parametrize(("titles", "said"), [
     (f"time,{axes('LinAcc{}', 'Gyro{}')}", "LinAccX is without gravity, which a track needs: record the accelerometer itself"),
     (f"time,timestamp,{axes('Acc{}', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
+    (axes("Acc{}", "Gyro{}"), "no column of times: add t_s in seconds, or one named count that counts the samples"),
     (f"time,{axes('Acc{} (LSB)', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
     (f"time,{axes('Acc{}', 'Acc.{}', 'Gyro{}')}", "other names: --columns OURS=THEIRS"),
     ("time,Acc X (g),AccY (m/s2),AccZ (g),GyroX,GyroY,GyroZ", "other names: --columns OURS=THEIRS"),

@@ -87,7 +87,6 @@ READERS: dict[str, tuple[Callable[[Path], str], str]] = {
     "legs: belt": (lambda f: leg(f, {3: "0.03,1,2,,0"}), "1 rows without a number in belt_rad_s: taken as no turning"),
     "floors: no number": (lambda f: air(f, {3: "0.3,x"}), r"^1 rows without a number in t_s or pressure_pa: skipped \(first: line 5\)"),
     "floors: no air": (lambda f: air(f, {3: "0.3,5"}), "1 rows with pressure_pa outside of"),
-    "floors: reset value": (lambda f: air(f, {0: "0.0,68500"}), "1 rows before the barometer had settled"),
 }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
+from echostep_app.scorecard.card import score
 from echostep_app.scorecard.track_columns import TIME_UNITS, load_path
 
 NOW_S = 1_700_000_000  # November 2023
@@ -78,6 +79,21 @@ def test_a_wrong_line_of_a_trajectory_is_named(tmp_path: Path) -> None:
 
 
 def test_comments_above_the_names(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("# made by a tracker\n# t_s, x_m, y_m\n0,1,2\n1,x,2\n")
+    (tmp_path / "a.csv").write_text("# made by: a tracker, today\n# t_s, x_m, y_m\n0,1,2\n1,x,2\n")
     with pytest.raises(EchostepError, match=r"a.csv:4: column x_m: 'x' is not a number"):
         load_path(tmp_path / "a.csv", None)
+
+
+def test_another_clock_and_other_names_are_told_with_the_next_step(tmp_path: Path) -> None:
+    """A truth of EuRoC, in nanoseconds; its column named t_s; its places named by another name."""
+    ours = load_path(track(tmp_path / "a.csv", "t_s", "s", begin_s=NOW_S), None)
+    true = track(tmp_path / "b.csv", "#timestamp", "ns", begin_s=NOW_S)
+    text = true.read_text().replace("x,y", "p_RS_R_x [m], p_RS_R_y [m]")
+    true.write_text(text)
+    assert score(ours, load_path(true, None)).ce50_m == pytest.approx(0.0, abs=1e-6)
+    true.write_text(text.replace("#timestamp", "t_s"))
+    with pytest.raises(EchostepError, match=r"same clock; those of .*b.csv would be in ns: name its column t_s t_ns"):
+        score(ours, load_path(true, None))
+    true.write_text(text.replace("p_RS_R_x", "px"))
+    with pytest.raises(EchostepError, match=r"b.csv:1: no column for x: .*; there are timestamp, px \[m\], p_RS"):
+        load_path(true, None)

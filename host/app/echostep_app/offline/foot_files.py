@@ -26,7 +26,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import Track
-from echostep.offline.csv_table import GREATEST, column_of, header_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import GREATEST, header_of, lines_of, open_samples
 from echostep.offline.imu_checks import NEEDED
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
@@ -128,8 +128,7 @@ def _vectors(file: TextIO, ours: str) -> Floats:
         raise ValueError("expected a column of times (seconds_elapsed, Time (s)) and the axes x, y, z")
     columns = {"t_s": time} | {ours + axis: name for axis, name in zip("xyz", axes, strict=True)}
     head = read_header(iter([first]), Naming(columns))
-    wanted = [column_of(head.names, name) for name in columns]
-    rows = head.in_si(read_rows(lines, (head.names, head.separator), wanted, 4, LIMITS).values, list(columns))
+    rows = head.table(lines, list(columns), 4, LIMITS).values
     return rows[np.isfinite(rows).all(axis=1)]
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -21,11 +20,12 @@ from echostep.board.calibration import ADIS16100_RAD_S, MOST_AHEAD_DEG, SPEED_OF
 from echostep.board.frames import encode
 from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID, Gyros, Outcome, Ping, Pressure, Ranger
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import column_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import lines_of, open_samples
 from echostep.offline.imu_csv import LIMITS, Imu
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import imu_settings, parse_settings, read_settings
 from echostep.timing.timeline import TICKS_PER_S
+from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foreign_columns import OWN, read_header
 from echostep_app.offline.imu_chunks import ImuChunks
 from echostep_app.offline.leg_csv import load_pair
@@ -35,7 +35,7 @@ Message = Ping | Pressure | Gyros
 GAP = 1.5  # periods: a longer step is a gap
 AT_ONCE = 10_000  # samples, which bound the memory
 FARTHEST_M = 0.5 * 65_535e-6 * SPEED_OF_SOUND_M_S  # that a ping can state
-PASCALS = (20_000.0, 120_000.0)  # of air where people are; assumed
+RANGES = ("t_s", "direction_deg", "range_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +103,9 @@ def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
     found: list[tuple[float, Message]] = []
     settings = read_settings(beside.settings) if beside.settings else ""
     if beside.pressure:
-        rows = _columns(beside.pressure, ("t_s", "pressure_pa"))
-        if not PASCALS[0] < np.median(rows[:, 1]) < PASCALS[1]:
-            raise EchostepError(
-                f"{beside.pressure}: pressure_pa {rows[0, 1]:g}: expected pascals, or pressure_pa (hPa)"
-            )
-        found += [
-            (t, Pressure(0, round(4.0 * p), PRESSURE_TEMPERATURE_INVALID)) for t, p in rows.tolist() if 0.0 < p < 2e5
-        ]
+        air = load_pressures(beside.pressure).samples
+        quarters = zip(air.t_s.tolist(), np.rint(4.0 * air.pressure_pa).astype(int).tolist(), strict=True)
+        found += [(t, Pressure(0, count, PRESSURE_TEMPERATURE_INVALID)) for t, count in quarters]
     if beside.ranges:
         pings, ahead_deg = _pings(beside.ranges)
         found += pings
@@ -125,7 +120,7 @@ def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
 
 def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
     """Times and pings of a file of ranges, an empty range being no echo; how far ahead of abeam (deg) its rangers look."""
-    rows = _columns(path, ("t_s", "direction_deg", "range_m"), required=2)
+    rows = open_samples(path, _ranges)
     ahead = np.unique(90.0 - np.abs(rows[:, 1]))
     if len(ahead) != 1 or abs(ahead[0]) > MOST_AHEAD_DEG:
         raise EchostepError(
@@ -144,17 +139,11 @@ def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
     return pings, float(ahead[0])
 
 
-def _columns(path: Path, names: tuple[str, ...], required: int = 2) -> Floats:
-    """Columns (n, k) of these names in SI, rows without a number in one of the first `required` left out; raises EchostepError."""
-    rows = open_samples(path, partial(_read_columns, names=names, required=required))
-    return rows[np.isfinite(rows[:, :required]).all(axis=1)]
-
-
-def _read_columns(file: TextIO, names: tuple[str, ...], required: int) -> Floats:
+def _ranges(file: TextIO) -> Floats:
+    """RANGES (n, 3), NaN for an empty range; rows without a time or direction left out; raises ValueError."""
     lines = lines_of(file, LIMITS)
     head = read_header(lines, OWN)
-    columns = [column_of(head.names, name) for name in names]
-    if -1 in columns:
-        raise ValueError(f"expected the columns {','.join(names)}; there are {', '.join(head.names)[:300]}")
-    rows = read_rows(lines, (head.names, head.separator), columns, required, LIMITS, head.line + 1)
-    return head.in_si(rows.values, names)
+    if not set(RANGES) <= set(head.names):
+        raise ValueError(f"expected the columns {','.join(RANGES)}; there are {', '.join(head.names)[:300]}")
+    rows = head.table(lines, RANGES, 2, LIMITS).values
+    return rows[np.isfinite(rows[:, :2]).all(axis=1)]

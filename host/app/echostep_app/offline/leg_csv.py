@@ -20,7 +20,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import CsvLimits, column_of, lines_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, lines_of, open_samples
 from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time, time_complaint
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_app.offline.leg_gyros import find_clipping_limits, repair_clipping, walking_axis
@@ -99,15 +99,14 @@ def _table(file: TextIO, prefix: str, naming: Naming) -> tuple[Floats, tuple[str
         for name, axes in zip(COLUMNS, names, strict=True)
     ]
     if missing := [name for source in sources for name in source if name not in header]:
+        degrees = [f"; {name} looks like degrees" for name in header if "deg" in name.lower()]
         raise ValueError(
             f"no column {', '.join(prefix + name for name in missing)}; the first line must name {','.join(COLUMNS)}[,{','.join(OPTIONAL)}], "
-            f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{ADVICE}{_unit_hint(header)}"
+            f"or thigh_x,thigh_y,thigh_z and shank_x,shank_y,shank_z for gyros of three axes{''.join(degrees[:1])}{ADVICE}"
         )
     wanted = [name for source in sources for name in source]
-    columns = [column_of(header, name) for name in (*wanted, *OPTIONAL)]
-    rows = read_rows(lines, (header, head.separator), columns, len(wanted), CsvLimits(), head.line + 1)
     named = [prefix + name if prefix + name in head.names else name for name in (*wanted, *OPTIONAL)]
-    values = head.in_si(rows.values, named)
+    values = head.table(lines, named, len(wanted), CsvLimits()).values
     series, notes, at = [], [], 0
     for name, source in zip(COLUMNS, sources, strict=True):
         rates = values[:, at : at + len(source)]
@@ -150,16 +149,6 @@ def _about_walking_axis(name: str, t_s: Floats, rates: Floats) -> tuple[Floats, 
     off = math.degrees(math.acos(min(float(np.abs(mounting.axis).max()), 1.0)))
     axis = "xyz"[int(np.argmax(np.abs(mounting.axis)))]
     return pitch_rate, f"{part}: the axis of walking is {off:.0f} degrees from the sensor's {axis}"
-
-
-def _unit_hint(header: list[str]) -> str:
-    """Advice for a header with a column in degrees; empty without one."""
-    degrees = [name for name in header if "deg" in name.lower()]
-    return (
-        f"; {degrees[0]} looks like degrees: multiply by pi/180 and name it rad, or give --columns and --units"
-        if degrees
-        else ""
-    )
 
 
 def complaint(table: Floats) -> str:

@@ -22,7 +22,7 @@ from echostep.plan import Plan
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import PlanSpaces, Spaces
 from echostep_app.scorecard.error_statistics import ErrorStatistics, error_statistics, quantile
-from echostep_app.scorecard.track_columns import ScoredPath
+from echostep_app.scorecard.track_columns import ScoredPath, other_unit
 
 FLOOR_PENALTY_M = 15.0  # per floor [Potorti et al. 2017]
 CELL_M = 1.0  # side of the squares that coverage counts: a person's room
@@ -231,6 +231,7 @@ def match(track: ScoredPath, truth: ScoredPath) -> Matched:
         raise EchostepError(
             f"{track.path}: no row within the time of {truth.path} ({truth.t_s[0]:g} to {truth.t_s[-1]:g} s; "
             f"the track's is {track.t_s[0]:g} to {track.t_s[-1]:g} s): both need the same clock"
+            f"{other_unit(truth, track.t_s[0], track.t_s[-1]) or other_unit(track, truth.t_s[0], truth.t_s[-1])}"
         )
     t_s = grid.t_s[chosen]
     true_row = chosen if surveyed else np.searchsorted(truth.t_s, t_s, side="right") - 1

@@ -13,13 +13,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError, replaced
-from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, lines_of, separator_of
+from echostep.errors import EchostepError
+from echostep.offline.csv_table import GREATEST, SEPARATORS, CsvLimits, header_of, is_comment, lines_of, open_samples
 
+Table = tuple[tuple[str, ...], list[tuple[int, tuple[str, ...]]]]  # names; number of the line and cells of each row
 MOST_ROWS = 1_000_000  # of a track: eight hours at 30 positions a second
 # Format of the RGB-D SLAM benchmark of TUM, written by evo and others
 TUM = "timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"
@@ -74,19 +76,12 @@ class CsvColumns:
         return value
 
 
-def is_comment(line: str) -> bool:
-    """Whether a line is words after a #, neither names of columns nor of a TUM trajectory's."""
-    return line.lstrip().startswith("#") and not any(mark in line for mark in SEPARATORS) and not is_tum(line)
-
-
 def is_tum(first: str) -> bool:
     """Whether the first line belongs to a TUM trajectory: eight names or numbers with spaces in between."""
     return not any(mark in first for mark in SEPARATORS) and len(first.lstrip("# ").split()) == len(TUM)
 
 
-def _read_tum(
-    first: str, lines: Iterable[str], number: int
-) -> tuple[tuple[str, ...], list[tuple[int, tuple[str, ...]]]]:
+def _read_tum(first: str, lines: Iterable[str], number: int) -> Table:
     """Names and rows of a TUM trajectory; lines that begin with # are comments."""
     rows = (
         (number, line)
@@ -99,33 +94,25 @@ def _read_tum(
     return TUM, (read[1:] if named else read)[: MOST_ROWS + 1]
 
 
+def _read_rows(file: TextIO) -> Table:
+    """Names and rows of a file; raises ValueError."""
+    lines, comments = lines_of(file, CsvLimits()), 0
+    while is_comment(first := next(lines, "")) and not is_tum(first):
+        comments += 1
+    if is_tum(first):
+        return _read_tum(first, lines, comments + 1)
+    names, delimiter = header_of(first.lstrip("# "))
+    reader = csv.reader(lines, delimiter=delimiter)
+    rows = ((reader.line_num + 1 + comments, tuple(cell.strip() for cell in row)) for row in reader if any(row))
+    try:
+        return tuple(names), list(islice(rows, MOST_ROWS + 1))
+    except csv.Error as error:
+        raise ValueError(f"not a CSV file: {error}") from error
+
+
 def read_csv(path: Path) -> CsvColumns:
     """Read a file; raises EchostepError. Empty lines are skipped, and comments (#) above the names; a # before the names is, too."""
-    try:
-        with path.open("rb") as begin:
-            if what := replaced(begin.read(32)):
-                raise EchostepError(f"{path}: {what}")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = lines_of(file, CsvLimits())
-            comments = 0
-            while is_comment(first := next(lines, "")):
-                comments += 1
-            if is_tum(first):
-                names, read = _read_tum(first, lines, comments + 1)
-            else:
-                delimiter = separator_of(first)
-                names = tuple(name.strip() for name in next(csv.reader([first.lstrip("# ")], delimiter=delimiter), ()))
-                reader = csv.reader(lines, delimiter=delimiter)
-                rows = (
-                    (reader.line_num + 1 + comments, tuple(cell.strip() for cell in row)) for row in reader if any(row)
-                )
-                read = list(islice(rows, MOST_ROWS + 1))
-    except OSError as error:
-        raise EchostepError(f"{path}: cannot read it: {error.strerror or error}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise EchostepError(f"{path}: not a CSV file in UTF-8: {error}") from error
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+    names, read = open_samples(path, _read_rows)
     if len(read) > MOST_ROWS:
         raise EchostepError(f"{path}: more than {MOST_ROWS} rows: cut it into parts")
     if not any(names):

@@ -86,9 +86,8 @@ def tapped_walk(path: Path, plan: Plan, start: Start | Pose | None) -> TappedWal
     timed = [tap for tap in taps.kept.values() if math.isfinite(tap.t_s)]
     truth = _truth(path, timed, plan)
     sd_m = float(np.median([tap.check_in.sd_m for tap in timed]))
-    words = (
-        f"{path}: {len(timed)} taps, each with a standard deviation of {sd_m:.2f} m; the track was made without them"
-    )
+    taken = f"{len(timed)} taps, each with a standard deviation of {sd_m:.2f} m; the track was made without them"
+    words = f"{path}: {taken}"
     return TappedWalk(track_of(estimates, str(path)), truth, words, [f"{path}: {line}" for line in recording.damage()])
 
 
@@ -105,9 +104,7 @@ def _truth(path: Path, taps: list[TimedTap], plan: Plan) -> ScoredPath:
             )
     t_s = np.array([tap.t_s for tap in taps])
     if len(taps) > 1 and float(np.median(np.diff(t_s))) <= PATH_S:
-        raise EchostepError(
-            f"{path}: most taps came within {PATH_S:g} s of the one before: no walk from point to point"
-        )
+        raise EchostepError(f"{path}: most taps came within {PATH_S:g} s of the one before: no walk of points")
     at = [tap.check_in for tap in taps]
     return ScoredPath(
         path, t_s, np.array([(tap.x_m, tap.y_m) for tap in at]), np.zeros(len(at), bool), {},

@@ -23,23 +23,10 @@ from echostep.plan import Plan
 from echostep_app.scorecard.csv_columns import CsvColumns, read_csv
 
 NAMES = {
-    "time": (
-        "t_s",
-        "t",
-        "time_s",
-        "time",
-        "timestamp_s",
-        "timestamp",
-        "time_ms",
-        "timestamp_ms",
-        "t_ms",
-        "time_ns",
-        "timestamp_ns",
-        "t_ns",
-    ),
-    "x": ("x_m", "x", "east_m", "east", "pos_x", "tx"),
-    "y": ("y_m", "y", "north_m", "north", "pos_y", "ty"),
-    "height": ("z_m", "z", "height_m", "height", "pos_z", "tz"),
+    "time": tuple(f"{word}{unit}" for unit in ("_s", "", "_ms", "_us", "_ns") for word in ("t", "time", "timestamp")),
+    "x": ("x_m", "x", "east_m", "east", "pos_x", "tx", "p_rs_r_x [m]"),
+    "y": ("y_m", "y", "north_m", "north", "pos_y", "ty", "p_rs_r_y [m]"),
+    "height": ("z_m", "z", "height_m", "height", "pos_z", "tz", "p_rs_r_z [m]"),
     "floor": ("level", "floor", "storey"),
     "radius95": ("radius95_m", "ce95_m"),
     "protection": ("protection_m", "protection_level_m"),
@@ -80,9 +67,8 @@ class ScoredPath:
     def described(self) -> str:
         """The columns that were used, in words."""
         units = {"time": "" if self.time_unit == "s" else f" in {self.time_unit}"}
-        return f"{self.path}: " + ", ".join(
-            f"{what} is {name}{units.get(what, '')}" for what, name in self.columns.items()
-        )
+        used = ", ".join(f"{what} is {name}{units.get(what, '')}" for what, name in self.columns.items())
+        return f"{self.path}: {used}"
 
 
 def load_path(path: Path, plan: Plan | None) -> ScoredPath:
@@ -91,7 +77,8 @@ def load_path(path: Path, plan: Plan | None) -> ScoredPath:
     columns = {what: name for what, names in NAMES.items() if (name := table.find(names)) is not None}
     for what in REQUIRED:
         if what not in columns:
-            raise EchostepError(f"{path}:1: no column for {what}: it may be named {', '.join(NAMES[what])}")
+            wanted, there = ", ".join(NAMES[what]), ", ".join(table.names)[:300]
+            raise EchostepError(f"{path}:1: no column for {what}: it may be named {wanted}; there are {there}")
     xy_m = np.column_stack([table.numbers(columns[axis]) for axis in "xy"])
     written = table.numbers(columns["time"])
     unit = time_unit(columns["time"], written, xy_m)
@@ -133,14 +120,22 @@ def time_unit(name: str, written: Floats, xy_m: Floats) -> str:
     return next((unit for unit in ("ms", "us", "ns") if WALKED_M_S[0] <= fast[unit] <= WALKED_M_S[1]), "s")
 
 
+def other_unit(own: ScoredPath, begin_s: float, end_s: float) -> str:
+    """The unit in which the times of a file would be those from `begin_s` to `end_s`, as the end of an error; empty for none."""
+    for unit, second in TIME_UNITS.items():
+        t_s = own.t_s * (second / TIME_UNITS[own.time_unit])
+        alike = 0.1 <= np.ptp(t_s) / max(end_s - begin_s, 1e-9) <= 10.0
+        if alike and t_s[0] <= end_s and begin_s <= t_s[-1]:
+            return f"; those of {own.path} would be in {unit}: name its column {own.columns['time']} t_{unit}"
+    return ""
+
+
 def _levels(table: CsvColumns, name: str | None, height_m: Floats | None, plan: Plan | None) -> Floats | None:
     """Floor of each row: the column's, else the level of the plan nearest to the height, else the plan's only one."""
     if name is not None:
         index = {level.name: k for k, level in enumerate(plan.levels)} if plan else {}
         return np.array([_level(table, k, name, text, index.get) for k, text in enumerate(table.texts(name))])
-    if plan is None:
-        return None
-    return levels_at(height_m, len(table.rows), plan)
+    return levels_at(height_m, len(table.rows), plan) if plan else None
 
 
 def levels_at(height_m: Floats | None, rows: int, plan: Plan) -> Floats | None:

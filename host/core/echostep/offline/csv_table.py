@@ -29,7 +29,7 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # byte order marks [Unicode 2.13]: Excel's 
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
-TIME_UNITS = (("milliseconds", "ms", 1e3), ("microseconds", "us", 1e6), ("nanoseconds", "ns", 1e9))  # per second
+TIME_UNITS = ("seconds", "s", 1.0), ("milliseconds", "ms", 1e3), ("microseconds", "us", 1e6), ("nanoseconds", "ns", 1e9)
 
 Result = TypeVar("Result")
 
@@ -43,15 +43,15 @@ class CsvLimits:
     early_rows: int | None = EARLY_ROWS
 
 
-def separator_of(first_line: str) -> str:
-    """The most frequent of comma, semicolon and tab."""
-    return max(SEPARATORS, key=first_line.count)
-
-
 def header_of(first_line: str) -> tuple[list[str], str]:
-    """Names of the columns in the first line, and the separator."""
-    separator = separator_of(first_line)
+    """Names of the columns in the first line, and the separator: the most frequent of comma, semicolon and tab."""
+    separator = max(SEPARATORS, key=first_line.count)
     return [name.strip().strip('"') for name in next(csv.reader([first_line], delimiter=separator), [""])], separator
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line above the names of the columns is words after a #, and not these names."""
+    return line.lstrip().startswith("#") and (":" in line or not any(mark in line for mark in SEPARATORS))
 
 
 def column_of(header: Sequence[str], name: str) -> int:
@@ -131,13 +131,18 @@ def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequ
 
 def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
     """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
-    if range_hz[0] <= rate <= range_hz[1]:
+    unit, option, factor = unit_of_times(rate, range_hz)
+    if option == "s":
         return ""
-    for unit, option, factor in TIME_UNITS:
-        if range_hz[0] <= rate * factor <= range_hz[1]:
-            return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
+    if option:
+        return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
     advice = too_slow if rate < range_hz[0] else too_fast
     return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
+
+
+def unit_of_times(rate: float, range_hz: tuple[float, float]) -> tuple[str, str, float]:
+    """Name, option and number in a second of the unit in which times of this rate (Hz, if they were seconds) are in the range; "" for none."""
+    return next((unit for unit in TIME_UNITS if range_hz[0] <= rate * unit[2] <= range_hz[1]), ("", "", 0.0))
 
 
 def number_of(text: str) -> float:

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.offline.csv_table import header_of
+from echostep.offline.csv_table import CsvLimits, CsvTable, column_of, header_of, read_rows
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """`names` of the columns, this project's where they are known; `line`: their line in the file; `factors` to SI by name.
+    """`names` of the columns, this project's where they are known; `line`: of the file, above the first row; `factors` to SI by name.
 
     `counts_hz`: counts a second, if `t_s` is a counter, which wraps after `counts_period`. `notes`: which logger was recognised.
-    `advice`: for a file that lacks a column.
+    `advice`: for a file that lacks a column. `begin`: the first lines of numbers, which were read to know the units.
     """
 
     names: list[str]
@@ -31,14 +32,17 @@ class Header:
     counts_period: int = 1
     notes: tuple[str, ...] = ()
     advice: str = ""
+    begin: tuple[str, ...] = ()
 
-    def in_si(self, values: Floats, names: Sequence[str]) -> Floats:
-        """Columns (n, k) of these names in SI units."""
-        scaled: Floats = values * [self.factors.get(name, 1.0) for name in names]
+    def table(self, lines: Iterator[str], names: Sequence[str], required: int, limits: CsvLimits) -> CsvTable:
+        """Columns of these names in SI units, of `begin` and of the lines after it, as `read_rows` has them; NaN for a column that is not there."""
+        head, columns = (self.names, self.separator), [column_of(self.names, name) for name in names]
+        rows = read_rows(chain(self.begin, lines), head, columns, required, limits, self.line + 1)
+        scaled: Floats = rows.values * [self.factors.get(name, 1.0) for name in names]
         if self.counts_hz is not None:
             time = list(names).index("t_s")
-            scaled[:, time] = since_first(values[:, time], self.counts_period) / self.counts_hz
-        return scaled
+            scaled[:, time] = since_first(rows.values[:, time], self.counts_period) / self.counts_hz
+        return CsvTable(scaled, rows.line)
 
 
 HeaderReader = Callable[[Iterator[str]], Header]  # takes the lines up to the names of the columns

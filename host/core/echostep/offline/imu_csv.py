@@ -22,7 +22,7 @@ from echostep.foot.alignment import aligned
 from echostep.foot.steps import Stance, Step, Track, walk_track
 from echostep.foot.trunk_path import RUN_STANCE_S
 from echostep.offline.bursts import spread
-from echostep.offline.csv_table import CsvLimits, column_of, lines_of, number_of, open_samples, read_rows
+from echostep.offline.csv_table import CsvLimits, lines_of, number_of, open_samples
 from echostep.offline.header import HeaderReader, own_header
 from echostep.offline.imu_checks import complaint, contradiction, end_sd_m, notes, sorted_by_time, whole_rows
 
@@ -73,11 +73,9 @@ def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tup
         hint = ": the first line must name the columns" if all(map(math.isfinite, map(number_of, header))) else ""
         raise ValueError(f"no column {', '.join(missing)}{hint}; there are {', '.join(header)[:300]}{head.advice}")
     wanted = COLUMNS + MAG_COLUMNS if all(name in header for name in MAG_COLUMNS) else COLUMNS
-    columns = [column_of(header, name) for name in wanted]
     half = [name for name in MAG_COLUMNS if name in header and name not in wanted]
     left_out = (f"{', '.join(half)} without the other axes of the magnetometer: left out",) if half else ()
-    rows = read_rows(lines, (header, head.separator), columns, len(COLUMNS), LIMITS, head.line + 1)
-    return head.in_si(rows.values, wanted), (*head.notes, *left_out)
+    return head.table(lines, wanted, len(COLUMNS), LIMITS).values, (*head.notes, *left_out)
 
 
 def write_foot_track(path: Path | str, track: Track) -> None:

@@ -40,9 +40,7 @@ def parse_heights(text: str) -> Floats:
     try:
         heights = [float(cell) for cell in text.split(",")]
     except ValueError as error:
-        raise EchostepError(
-            f"--heights {text}: metres with commas between are expected, as 0,3.5,7, or auto"
-        ) from error
+        raise EchostepError(f"--heights {text}: metres between commas are expected, as 0,3.5,7, or auto") from error
     return checked_heights(np.array(heights))
 
 

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint, read_rows
-from echostep_app.offline import foreign_columns
-from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint
+from echostep_app.offline.foreign_columns import ADVICE, OWN, UNITS, Naming, read_header
 
 COLUMNS = ("t_s", "pressure_pa")
 TEMPERATURE = "temperature_c"
@@ -37,12 +36,8 @@ SETTLING = 9  # samples: about a second of the SCP1000
 FASTEST_PA_S = 120.0  # an express lift, 10 m/s
 STEP_PA = 18.0  # that noise makes: six standard deviations of the SCP1000's high-speed mode
 KELVIN_FROM = 200.0  # a median temperature above this number is likely in kelvins: no air is so hot in degC
-UNITS = (  # name, and pascals in it
-    ("hPa", 100.0),
-    ("kPa", 1000.0),
-    ("bar", 1e5),
-    ("mmHg", 133.322),
-    ("inHg", 3386.39),
+PASCALS = (  # name, and pascals in it
+    *((unit, factor) for unit, (quantity, factor) in UNITS.items() if quantity == "pressure"),
     ("a quarter of a pascal (SCP1000 counts)", 0.25),
 )
 USUAL_PA = (80_000.0, 108_000.0)  # pressures from about 2000 m of height down to the sea, to guess a unit
@@ -78,19 +73,18 @@ def _table(lines: Iterator[str], naming: Naming) -> tuple[Floats, Ints, tuple[st
         raise ValueError(
             f"line 1: no column {', '.join(missing)}; the first line must name t_s,pressure_pa[,temperature_c]{ADVICE}"
         )
-    if twice := [name for name in wanted if header.count(name) > 1]:
-        raise ValueError(f"line 1: column {twice[0]} is there twice")
-    columns = [header.index(name) if name in header else -1 for name in wanted]
-    table = read_rows(lines, (header, head.separator), columns, len(COLUMNS), LIMITS, head.line + 1)
-    if len(table.line) < 2:
-        raise ValueError("no samples: two rows at least are needed under the names of the columns")
-    return head.in_si(table.values, wanted), table.line, head.notes
+    table = head.table(lines, wanted, len(COLUMNS), LIMITS)
+    return table.values, table.line, head.notes
 
 
 def _checked(table: Floats, lines: Ints, source: tuple[str, ...]) -> PressureRecord:
     """The usable samples of a table (n, 3) with line numbers (n,); raises ValueError when too few are usable, or when the unit is wrong."""
     table, lines, notes = _usable_rows(table, lines)
-    _check_rate(table[:, TIME])
+    rate = 1.0 / float(np.median(np.diff(table[:, TIME]))) if len(table) > 1 else 0.0
+    if wrong := rate_complaint(
+        rate, RATE_HZ, "two seconds between samples are the most", "average them down to 50 or fewer"
+    ):
+        raise ValueError(wrong)
     notes += _gap_notes(table[:, TIME], lines)
     if np.ptp(table[:, PRESSURE]) == 0.0:
         raise ValueError("pressure_pa never changes: is the sensor read?")
@@ -102,9 +96,8 @@ def _usable_rows(table: Floats, lines: Ints) -> tuple[Floats, Ints, tuple[str, .
     """Rows with a possible pressure and increasing times, their line numbers, and notes on the rows left out."""
     whole: Bools = np.asarray(np.isfinite(table[:, : len(COLUMNS)]).all(axis=1))
     if not whole.all() and (~whole).mean() > MOST_BAD:
-        raise ValueError(
-            f"line {lines[~whole][0]}: no number in {_field(table[~whole][0])}, as in {100 * (~whole).mean():.0f} % of the rows"
-        )
+        field, share = COLUMNS[int(math.isfinite(table[~whole][0, TIME]))], 100 * (~whole).mean()
+        raise ValueError(f"line {lines[~whole][0]}: no number in {field}, as in {share:.0f} % of the rows")
     notes = _note(~whole, lines, "without a number in t_s or pressure_pa: skipped")
     table, lines = table[whole], lines[whole]
     if len(table) < 2:
@@ -150,11 +143,6 @@ def _gap_notes(t_s: Floats, lines: Ints) -> tuple[str, ...]:
     )
 
 
-def _field(row: Floats) -> str:
-    """Name of the first column without a number."""
-    return COLUMNS[TIME] if not math.isfinite(row[TIME]) else COLUMNS[PRESSURE]
-
-
 def _note(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
     """A note with the number of rows where `bad` (n,) is true and the line of the first; none without such rows."""
     return (f"{int(bad.sum())} rows {what} (first: line {lines[bad][0]})",) if bad.any() else ()
@@ -162,27 +150,14 @@ def _note(bad: Any, lines: Ints, what: str) -> tuple[str, ...]:
 
 def _check_unit(pressure: Floats, lines: Ints) -> None:
     """Raise ValueError, with the likely unit, when the median pressure is not that of air in pascals."""
-    middle = float(np.median(pressure))
+    middle, said = float(np.median(pressure)), f"line {lines[0]}: pressure_pa is {pressure[0]:g}"
     if LOWEST_PA <= middle <= HIGHEST_PA:
         return
-    for unit, factor in UNITS:
+    for unit, factor in PASCALS:
         if USUAL_PA[0] <= middle * factor <= USUAL_PA[1]:
-            option = f", or say --units {unit}" if unit in foreign_columns.UNITS else ""
-            raise ValueError(
-                f"line {lines[0]}: pressure_pa is {pressure[0]:g}: is it in {unit}? multiply it by {factor:g} to have pascals{option}"
-            )
-    raise ValueError(
-        f"line {lines[0]}: pressure_pa is {pressure[0]:g}, not the pressure of air: pascals are expected, about 100000"
-    )
-
-
-def _check_rate(t_s: Floats) -> None:
-    """Raise ValueError when the sample rate is outside of RATE_HZ."""
-    rate = 1.0 / float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
-    if wrong := rate_complaint(
-        rate, RATE_HZ, "two seconds between samples are the most", "average them down to 50 or fewer"
-    ):
-        raise ValueError(wrong)
+            option = f", or say --units {unit}" if unit in UNITS else ""
+            raise ValueError(f"{said}: is it in {unit}? multiply it by {factor:g} to have pascals{option}")
+    raise ValueError(f"{said}, not the pressure of air: pascals are expected, about 100000")
 
 
 def _temperatures(column: Floats, lines: Ints) -> tuple[Floats | None, tuple[str, ...]]:

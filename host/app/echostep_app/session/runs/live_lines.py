@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.offline.csv_table import CsvLimits, column_of, number_of, read_rows
+from echostep.offline.csv_table import CsvLimits, column_of, number_of
 from echostep.offline.header import Header
 from echostep.offline.imu_csv import COLUMNS
 from echostep.ports.chunks import Chunk
@@ -32,7 +32,7 @@ class LineReader:
     def __init__(self) -> None:
         self.header = ""
         self.unreadable = 0
-        self._columns: tuple[Header, list[int]] | None = None
+        self._columns: Header | None = None
         self._rest, self._too_long = b"", False
 
     def feed(self, received: bytes) -> Floats:
@@ -56,9 +56,7 @@ class LineReader:
             return np.empty((0, len(COLUMNS))) if self._name_columns(line) else None
         if self._columns is None:
             return None
-        head, columns = self._columns
-        rows = read_rows(iter([line]), (head.names, head.separator), columns, 0, CsvLimits(early_rows=None))
-        values = head.in_si(rows.values, COLUMNS)
+        values = self._columns.table(iter([line]), COLUMNS, 0, CsvLimits(early_rows=None)).values
         return values if (np.abs(values) < MOST).all() else None
 
     def _name_columns(self, line: str) -> bool:
@@ -67,12 +65,12 @@ class LineReader:
             return True
         try:
             head = read_header(iter([line]))
-            columns = [column_of(head.names, name) for name in COLUMNS]
+            lacks = min(column_of(head.names, name) for name in COLUMNS) < 0
         except ValueError:
             return False
-        if min(columns) < 0 or head.counts_hz is not None:
+        if lacks or head.counts_hz is not None:
             return False
-        self.header, self._columns = line, (head, columns)
+        self.header, self._columns = line, head
         return True
 
 
