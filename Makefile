@@ -27,11 +27,13 @@ $(BIN)/python:
 
 $(READY): $(LISTS) | $(BIN)/python
 	@$(BIN)/python tools/install.py tests
+	@$(BIN)/python -m compileall -q host/core host/app
 	@PYTHONPATH=tests $(BIN)/python tests/compile_kernels.py
 	@touch $@
 
 $(VENV)/demo-ready: $(LISTS) | $(BIN)/python
 	@$(BIN)/python tools/install.py demo
+	@$(BIN)/python -m compileall -q host/core host/app
 	@touch $@
 
 firmware: ## build the firmware (firmware/build/echostep.elf and .hex) and put it into the host package

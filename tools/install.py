@@ -24,9 +24,9 @@ NEWEST = {
     "demo": ("-e", "host/core", "-e", "host/app[page,plots]", "pyproj"),
     "tests": ("-e", "host/core", "-e", "host/app[dev]", "-e", "host/studies[cluster]"),
 }
-# Imports compile what they need
-PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--no-compile"]
-LOOK_S = 0.2  # between two looks at how far pip is
+# Imports compile what they need; where they may not keep it, each start would compile it again
+WHEN = "--compile" if sys.dont_write_bytecode else "--no-compile"
+PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", WHEN]
 
 
 def requirements(part: str) -> str:
@@ -54,7 +54,7 @@ def install(*words: str, count: int = 0) -> tuple[bool, str]:
                 put = len(list(site.glob("*.dist-info"))) - before
                 share = (fetched + put) / (2 * max(count - needless, 1))
                 print(f"\rInstalling {count - needless} packages: {min(share, 1):.0%} ", end="", flush=True)
-            time.sleep(LOOK_S)
+            time.sleep(0.2)
         if count and sys.stdout.isatty():
             print("\r\033[K", end="")
         return process.returncode == 0, printed()

@@ -190,15 +190,28 @@ def test_a_command_in_a_sentence_can_be_typed_as_it_stands(page: Path) -> None:
     """As the command line takes it; the name of a command may stand alone."""
     for span in spans(page, "echostep"):
         line = re.sub(r"[][]| \.\.\.|\|svg", "", span.partition(" | ")[0])
-        _, *words = shlex.split(re.sub(r" [NM]\b", " 1", line.replace("COMMAND", "demo")))
-        command = typer.main.get_command(app)
-        while hasattr(command, "resolve_command") and words and not words[0].startswith("-"):
-            _, command, words = command.resolve_command(command.make_context("echostep", ["x"]), words)
-        if words and words != ["--help"]:
-            try:
-                command.make_context("echostep", words)
-            except typer._click.exceptions.ClickException as error:
-                pytest.fail(f"{span}: {error.format_message()}")
+        parse(re.sub(r" [NM]\b", " 1", line.replace("COMMAND", "demo")))
+
+
+def parse(line: str) -> None:
+    """A command, alone or with what it takes, as the command line parses it; it is not run."""
+    _, *words = shlex.split(line)
+    command = typer.main.get_command(app)
+    while hasattr(command, "resolve_command") and words and not words[0].startswith("-"):
+        _, command, words = command.resolve_command(command.make_context("echostep", ["x"]), words)
+    if words and words != ["--help"]:
+        try:
+            command.make_context("echostep", words)
+        except typer._click.exceptions.ClickException as error:
+            pytest.fail(f"{line}: {error.format_message()}")
+
+
+@pytest.mark.parametrize(
+    "name", ["demo", "live", "record", "replay", "foot", "import", "score", "export", "plan import", "plan check"]
+)
+def test_the_example_of_a_help_can_be_typed_as_it_is_printed(name: str) -> None:
+    (line,) = re.findall(rf"^ +(echostep {name} .*)$", echostep(*name.split(), "--help").stdout, flags=re.M)
+    parse(line)
 
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "host/docs/notebooks/README.md"], ids=name_of)

@@ -235,16 +235,12 @@ def test_a_restart_has_no_past() -> None:
 
 
 def test_the_room_of_a_place_is_bounded_by_its_walls() -> None:
-    walls = lines_of(box(sites.one_floor(1, 0).built))
+    walls = shapely.MultiLineString(list(box(sites.one_floor(1, 0).built).reshape(-1, 2, 2)))
     for x, y in ((3.0, 5.0), (20.0, -1.0), (29.0, 5.0), (15.0, 1.5)):
         room = shapely.Polygon(sites.room_at(x, y))
         assert room.contains(shapely.Point(x, y))
         assert room.exterior.intersection(walls.buffer(1e-6)).length > 0.6 * room.length  # the rest is doors
         assert room.buffer(-0.25).intersection(walls).length == 0.0
-
-
-def lines_of(walls: Floats) -> shapely.MultiLineString:
-    return shapely.MultiLineString([(w[:2], w[2:]) for w in walls.tolist()])
 
 
 def box(plan: Plan) -> Floats:

@@ -106,17 +106,8 @@ def test_the_cases_have_names_of_their_own() -> None:
 
 @pytest.mark.long
 def test_command_writes_rows_and_a_picture(tmp_path: Path) -> None:
-    arguments = [
-        "evaluate",
-        "fischer2008",
-        "--runs",
-        "2",
-        "--json",
-        "rows.json",
-        "--out",
-        "out",
-    ]
-    echostep(*arguments, cwd=tmp_path, env=os.environ | {"COLUMNS": "200"}, ends=0)
+    words = ["evaluate", "fischer2008", "--runs", "2", "--json", "rows.json", "--out", "out"]
+    echostep(*words, cwd=tmp_path, env=os.environ | {"COLUMNS": "200"}, ends=0)
     rows = json.loads((tmp_path / "rows.json").read_text())["rows"]
     assert [row["name"] for row in rows] == [case.name for case in cases()]
     assert all(set(row) == {"name", "success", "low95", "high95", "runs"} for row in rows)

@@ -15,28 +15,18 @@ from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
 from recording.test_decode import expect_every_frame
 
-REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in (DATA / "mtb").glob(f"**/*.{end}"))
-
-
-@needs_data("mtb")
-@pytest.mark.parametrize("path", REAL, ids=lambda path: "-".join(path.parts[-2:]))
-def test_every_valid_frame_of_a_real_capture_comes_out(path: Path) -> None:
-    expect_every_frame(path)
-
-
 MTB = DATA / "mtb"
-
-
+REAL = sorted(p for end in ("bin", "mtb", "xbus") for p in MTB.glob(f"**/*.{end}"))
 CAPTURES = [f"einride_{k}" for k in (1, 2, 3, 5)]
-
-
+FORMS = ("Float32", "FP1220", "FP1632", "Float64")
+Golden = list[tuple[str, list[str]]]
 needs_captures = needs_data("mtb")
 
 
-FORMS = ("Float32", "FP1220", "FP1632", "Float64")
-
-
-Golden = list[tuple[str, list[str]]]
+@needs_captures
+@pytest.mark.parametrize("path", REAL, ids=lambda path: "-".join(path.parts[-2:]))
+def test_every_valid_frame_of_a_real_capture_comes_out(path: Path) -> None:
+    expect_every_frame(path)
 
 
 def golden(path: Path) -> list[Golden]:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -85,6 +87,13 @@ def test_every_dependency_has_a_tested_version_that_is_allowed() -> None:
         versions = versions_of(part)
         for requirement in wanted(*extras):
             assert requirement.specifier.contains(versions[canonicalize_name(requirement.name)]), requirement
+
+
+@pytest.mark.process
+def test_bytecode_is_made_at_once_where_imports_may_not_keep_it() -> None:
+    code = f"import sys; sys.path.insert(0, {str(Path(install.__file__).parent)!r}); import install; print(install.PIP[-1])"
+    words = [subprocess.check_output([sys.executable, flag, "-c", code], text=True).strip() for flag in ("-B", "-I")]
+    assert words == ["--compile", "--no-compile"]
 
 
 HASHED, OWN = "--require-hashes -r", "--no-deps --no-build-isolation -e host/core -e host/app -e host/studies"

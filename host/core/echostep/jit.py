@@ -21,7 +21,7 @@ import sys
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, TypeVar, cast
 
 import numba
@@ -85,8 +85,12 @@ class _Part:
     """The object that numba compiles from a part. Called from Python, where it would crash without a wrapper, it raises TypeError."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        self.py_func = function
-        self.dispatcher: Any = _compiled(function, options)
+        self.py_func, self._options = function, options
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Made when a kernel that calls it is compiled: a kernel from the cache needs none."""
+        return _compiled(self.py_func, self._options)
 
     def __call__(self, *_arguments: object) -> None:
         raise TypeError(f"{self.py_func.__qualname__} is a part of kernels: Python cannot call it")

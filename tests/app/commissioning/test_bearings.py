@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from board.test_tilt_compass import frames
+from board.test_tilt_compass import shaken
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
 from echostep_app.commissioning.fitting import bearings
@@ -16,7 +16,7 @@ from echostep_app.commissioning.probe import ProbeResult
 
 def test_calibrate_takes_the_bearings_of_a_magnetometer() -> None:
     probed = ProbeResult()
-    for message in BoardReader().feed(frames(2, 1.1)):
+    for message in BoardReader().feed(shaken(2, 1.1)):
         assert isinstance(message, m.Motion | m.Magnetic)
         probed.axes.append(message)
         probed.ticks.setdefault(type(message).__name__, []).append(message.ticks)

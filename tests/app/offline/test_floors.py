@@ -57,12 +57,6 @@ def heights_of(samples: Pressures) -> Floats:
     return record.height_m[record.segment]
 
 
-@pytest.mark.long
-def test_standing_keeps_the_height_under_the_weather() -> None:
-    t = np.arange(10_800) / 9.0
-    assert abs(heights_of(record(np.zeros(10_800), extra_pa=100.0 / 3600.0 * t))[-1]) < 1.0  # of 2.8 m of weather
-
-
 def test_stairs_are_climbed_between_two_stays() -> None:
     found = height_record(record(stairs_up()))
     before, after = found.stays
@@ -201,16 +195,6 @@ def test_garbage_is_refused_in_words(tmp_path_factory: pytest.TempPathFactory, j
     source.write_bytes(b"t_s,pressure_pa,temperature_c\n" + junk)
     with pytest.raises(EchostepError):
         load_pressures(source)
-
-
-def test_mended_rows_are_told(tmp_path: Path) -> None:
-    lines = write(tmp_path / "m.csv", record(stairs_up())).read_text().splitlines()
-    lines[5], lines[9], lines[12] = "x,y", lines[8], "1.2,5"
-    (tmp_path / "m.csv").write_text("\n".join(lines))
-    notes = " ".join(load_pressures(tmp_path / "m.csv").notes)
-    assert "line 6" in notes
-    assert "line 13" in notes
-    assert "line 10" in notes
 
 
 @pytest.mark.parametrize("text", ["", "0,", "0,x", "3,0", "0,0.2", "nan,3", "0,1e9", "0 3"])

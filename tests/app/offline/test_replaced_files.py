@@ -50,14 +50,3 @@ def test_the_kind_and_the_next_step_are_named(tmp_path: Path, command: tuple[str
         return
     assert (done.returncode, done.stderr) == (2, f"echostep: a: {said}\n"), done.stdout
     assert said in echostep("info", "a", cwd=tmp_path).stdout + echostep("info", "a", cwd=tmp_path).stderr
-
-
-def test_tabs_with_decimal_commas_are_read_as_semicolons_are(tmp_path: Path) -> None:
-    """Three minutes on two floors and ten seconds of stairs, as a phone's logger exports them."""
-    climbed = [min(max(k - 160, 0) / 20, 1.0) for k in range(360)]
-    rows = ["Time (s)\tPressure (hPa)"] + [f"{0.5 * k:.3f}\t{1013.25 - 0.42 * up:.4f}" for k, up in enumerate(climbed)]
-    (tmp_path / "p.csv").write_text("\n".join(rows[:1] + [row.replace(".", ",") for row in rows[1:]]))
-    done = echostep("floors", "p.csv", "--heights", "0,3.5,7", "--start", "0", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "floor 0 (0 m): 0.0 to " in done.stdout
-    assert "stays on 2 floors" in done.stdout

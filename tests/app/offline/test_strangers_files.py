@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -37,6 +39,43 @@ def clocked(path: Path) -> None:
     )
 
 
+def filled(rows: np.ndarray) -> np.ndarray:
+    """Thirty rows without a sample: zeros, and -9999."""
+    rows[150:-150:50, 1:] = np.where(np.arange(len(rows[150:-150:50]))[:, None] % 2, 0.0, -9999.0)
+    return rows
+
+
+def dot(rows: np.ndarray) -> np.ndarray:
+    """Movella DOT's, without the lines above the names; its microseconds wrap."""
+    clock = (np.round(1e6 * rows[:, 0]) + (1 << 32) - 5e6) % (1 << 32)
+    return np.column_stack([clock, rows[:, 1:4], np.degrees(rows[:, 4:])])
+
+
+OURS, DOT = (
+    ",".join(COLUMNS),
+    "SampleTimeFine," + ",".join(f"{what}_{axis}" for what in ("Acc", "Gyr") for axis in "XYZ"),
+)
+
+
+@pytest.mark.parametrize(("spoil", "names", "form", "says"), [
+    (filled, OURS, "%.9g", r"2\d rows without a number in some column: skipped"),
+    (lambda rows: np.column_stack([1e-6 * dot(rows)[:, 0], rows[:, 1:]]), OURS, "%.9f", "12 steps"),
+    (dot, DOT, "%.12g", "read as an export of Movella DOT"),
+    (lambda rows: rows, OURS, '"%.6f"', "12 steps"),
+])  # fmt: skip
+def test_what_other_loggers_write_is_the_same_walk(
+    spoil: Callable[[np.ndarray], np.ndarray], names: str, form: str, says: str, tmp_path: Path
+) -> None:
+    """A cell in quotes has a decimal comma."""
+    rows = spoil(np.column_stack(walking(12, 100)))
+    np.savetxt(tmp_path / "imu.csv", rows, form, ",", header=names, comments="")
+    text = (tmp_path / "imu.csv").read_text()
+    (tmp_path / "imu.csv").write_text(text.replace(".", ",") if '"' in text else text)
+    said = echostep("foot", "imu.csv", cwd=tmp_path, ends=0).stdout
+    assert re.search(says, said), said
+    assert "12 steps, 15.6" in said
+
+
 @pytest.mark.parametrize(
     ("write", "says"), [(held, "99 rows repeat the one before them: taken as missing"), (clocked, "12 steps")]
 )
@@ -45,6 +84,12 @@ def test_held_rows_are_missing_and_a_clock_tells_the_time(
 ) -> None:
     write(tmp_path / "imu.txt")
     assert says in (said := echostep("foot", "imu.txt", cwd=tmp_path, ends=0)).stderr + said.stdout
+
+
+@pytest.mark.parametrize("command", ["foot", "legs"])
+def test_a_pipe_is_named_before_it_is_waited_for(command: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    assert "pipe: no file, but a folder, pipe or device" in echostep(command, "pipe", cwd=tmp_path, ends=2).stderr
 
 
 @pytest.mark.process

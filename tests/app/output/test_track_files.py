@@ -93,6 +93,10 @@ def test_places_on_earth_are_the_same_in_all_formats(folder: Path, estimates: li
     assert np.array_equal(np.frombuffer(line[9:]).reshape(-1, 2), expected)
     columns = parquet.read_table(export(folder, "track.parquet")).to_pydict()
     assert np.array_equal(np.column_stack((columns["longitude_deg"], columns["latitude_deg"])), expected)
+    *points, line = json.loads(export(folder, "track.geojson").read_text())["features"]
+    assert (
+        [point["geometry"]["coordinates"] for point in points] == line["geometry"]["coordinates"] == expected.tolist()
+    )
     root = ET.parse(export(folder, "track.kml")).getroot()
     text = root.findtext(".//{*}LineString/{*}coordinates") or ""
     found = np.array([place.split(",") for place in text.split()], np.float64)
@@ -155,10 +159,21 @@ def test_what_cannot_be_written_is_named(folder: Path, name: str, plan: Path | s
     assert (folder / "walk.mcap").read_bytes() == before
 
 
-def test_the_command_says_what_it_wrote(folder: Path) -> None:
-    done = echostep("export", folder / "walk.mcap", "--plan", DEMO, "-o", folder / "by_command.csv")
+def test_a_track_without_a_place_on_earth_is_in_metres_and_says_so(folder: Path) -> None:
+    """Of a foot alone, without a plan, by the command; a GIS reads it."""
+    out = folder / "alone.geojson"
+    done = echostep("export", folder / "walk.mcap", "-o", out)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "by_command.csv" in done.stdout.splitlines()[-1]
+    assert "alone.geojson" in done.stdout.splitlines()[-1]
+    tree = json.loads(out.read_text())
+    assert tree["coordinates"].startswith("metres of the plan, not longitude and latitude")
+    *points, line = tree["features"]
+    for point, place in zip(points, line["geometry"]["coordinates"], strict=True):
+        told = point["properties"]
+        assert point["geometry"]["coordinates"] == [told["x_m"], told["y_m"]] == place
+        assert 0.0 < told["radius95_m"] < 5.0
+    assert line["properties"]["t_s"] == [point["properties"]["t_s"] for point in points]
+    assert pyogrio.read_info(out)["features"] == len(points) + 1
 
 
 def moments(kml: Path) -> list[str]:

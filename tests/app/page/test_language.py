@@ -27,7 +27,7 @@ from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import BASE, NAMES, TOWER, ServedTeam, place, whole_team
 from page.browser import READY, TABLE_READY, loaded_page, overflow, violations, wait_for
-from page.edit.drawing import answer, click, drag, status
+from page.edit.drawing import answers, click, drag, status
 from page.edit.test_editor_questions import doubtful_house
 from page.frames import scene, served
 from page.web.test_page_sizes import RATES, UNREACHED, moments
@@ -231,9 +231,9 @@ def test_nothing_is_cut_off_in_the_editor(browser: Any, lang: str, tmp_path: Pat
         page.click("#answer-yes")
         page.click("#whole")
         page.click("[data-tool='room']")
+        answers(page, "Attic")
         click(page, 3.0, 3.0)
         check()
-        answer(page, "Attic")
         page.click("[data-tool='wall']")
         click(page, 3.0, 3.0)
         check()

@@ -128,6 +128,12 @@ def test_charts_show_the_walk_and_what_happened(browser: Any, url: str, tmp_path
     wait_for(page, "echostep.charts.span[1] === 120")
     page.mouse.move(5, 5)
     wait_for(page, f"{near} === null")
+    fingers = page.context.new_cdp_session(page)
+    at = {"x": box["x"] + 34 + 0.75 * (box["width"] - 40), "y": box["y"] + 80}
+    fingers.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [at]})
+    wait_for(page, f"{near}?.[0] === 90")
+    fingers.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    wait_for(page, f"{near} === null")
     page.focus("#map")
     page.keyboard.press("t")
     page.click("#events button:has-text('lost')")

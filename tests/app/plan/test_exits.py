@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from echostep.errors import EchostepError
 from echostep.plan import Connector, Door, Level, Plan, load_plan
 from echostep_app.plan.closures import OpenWays, stroke
 from echostep_app.plan.cropping import is_clear
+from echostep_app.plan.pictures.drawing import draw_plan
+from echostep_app.plan.pictures.symbols import level_lines
 from echostep_app.plan.routing import CLIMB, EXIT, Goal, Route, RoutePlace, Routes
 from echostep_studies.frame.recordings import DATA
 from naive.ways import CELL_M, shortest_walks
@@ -52,6 +55,15 @@ def test_exits_are_the_doors_of_the_outline_on_the_ground() -> None:
     assert found(plan) == [(4.5, -0.6, 0), (20.6, 5.0, 0)]
     assert plan.exits[0].heading_rad == pytest.approx(-math.pi / 2)
     assert not house(level(0.0, Door(INNER))).exits
+
+
+def test_a_sign_leads_from_each_exit_of_its_level(tmp_path: Path) -> None:
+    """As a line of the pages, and with its word in the picture of `plan show`."""
+    plan = house(level(0.0, Door(SOUTH), Door(EAST), Door(INNER)), level(3.5, Door(INNER)))
+    assert level_lines(plan, 0)["exit"].round(2).tolist() == [[4.5, 0.0, 4.5, -1.6], [20.0, 5.0, 21.6, 5.0]]
+    assert not len(level_lines(plan, 1)["exit"])
+    draw_plan(plan, tmp_path / "house.svg", [0, 1])
+    assert (tmp_path / "house.svg").read_text().count("<!-- EXIT -->") == 2
 
 
 def test_gaps_in_the_outline_are_exits_where_it_has_no_doors() -> None:

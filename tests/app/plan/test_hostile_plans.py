@@ -96,9 +96,14 @@ def test_a_file_too_large_to_be_one_building_is_not_read(tmp_path: Path, suffix:
     ("text", "named"),
     [
         (json.dumps({"echostep_plan": 1, "levels": [{"walls": [[0, 0, 100_001, 0]]}]}), "within 100000 m"),
-        ('{"echostep_plan": 1, "levels": ' + "[" * 2000 + "]" * 2000 + "}", r"a\.json"),
+        ('{"echostep_plan": 1, "levels": ' + "[" * 2000 + "]" * 2000 + "}", "nested too deep"),
+        ('{"echostep_plan": 1, "name": ' + "9" * 5000 + "}", "too many digits"),
+        (
+            '{"echostep_plan": 1, "levels": [{"walls": [], "rooms": [], "walls": [[0, 0, 1, 0]]}]}',
+            "'walls' stands twice",
+        ),
     ],
-    ids=["far", "deep"],
+    ids=["far", "deep", "long", "twice"],
 )
 def test_a_plan_that_is_too_wide_or_too_deep_is_one_error(tmp_path: Path, text: str, named: str) -> None:
     (tmp_path / "a.json").write_text(text)

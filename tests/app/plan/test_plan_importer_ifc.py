@@ -349,3 +349,18 @@ def test_what_is_demolished_is_left_out(tmp_path: Path, on: str, status: str) ->
     gone = {"IfcDoor", on} if status == "DEMOLISH" else set()
     assert report.left_out == {f"{kind} to be demolished": 1 for kind in gone}
     assert (len(plan.levels[0].walls), len(plan.levels[0].doors)) == (12 - 8 * ("IfcWall" in gone), 1 - bool(gone))
+
+
+def test_a_wall_that_fills_a_room_is_asked_about(tmp_path: Path) -> None:
+    model = Model()
+    model.storey("Floor", 0.0)
+    model.box("IfcWall", (0, 0, 0), (6, 0.3, 2.8))
+    model.box("IfcWall", (1, 1, 0), (4, 2.5, 2.8), name="Fat")
+    model.file.write(str(tmp_path / "a.ifc"))
+    report = ImportReport()
+    (level,) = import_plan(tmp_path / "a.ifc", report=report).levels
+    assert len(level.walls) == 4
+    assert report.left_out == {"IfcWall that fills a room": 1}
+    (question,) = level.questions
+    assert (question.text, question.is_proposed) == ("wall 'Fat' fills 10.0 m2 and was left out: take it in?", True)
+    assert len(question.lines_m) == 4

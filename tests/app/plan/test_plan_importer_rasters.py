@@ -98,6 +98,7 @@ def test_the_command_takes_two_points(tmp_path: Path) -> None:
     done = command_line.echostep("plan", "import", path, "-o", out, "--scale", "50,50,550,50=10", "--no-picture")
     assert done.returncode == 0, done.stderr
     assert size_m(load_plan(out).levels[0]) == pytest.approx((10.0, 8.0), abs=0.1)
+    assert load_plan(out).picture == (0.02, 0.0, 0.0)
 
 
 def test_the_threshold_lies_between_ink_and_paper() -> None:

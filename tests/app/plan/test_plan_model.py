@@ -49,6 +49,7 @@ FULL: dict[str, Any] = GOOD | {
     "connectors": [{"kind": "stairs", "name": "S", "levels": ["first", 0], "outline": [[3, 0], [4, 0], [4, 1]]}],
     "georeference": {"crs": "EPSG:4326", "origin": [-2.978, 56.46], "rotation_deg": 12.5},
     "uncertainty_m": 0.05,
+    "picture": [0.02, 1, -3],
     "start": {"x": 1, "y": 1, "heading_deg": 90, "level": "first"},
 }
 
@@ -105,6 +106,9 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"georeference": {"origin": [0]}}, "georeference.origin"),
     ({"georeference": {"origin": [0, 9], "rotation_deg": "north"}}, "georeference.rotation_deg"),
     ({"uncertainty_m": -1}, "uncertainty_m"),
+    ({"picture": [0, 1, 1]}, r"picture\[0\]: 0 is not metres a pixel"),
+    ({"picture": [0.1, 1]}, "picture"),
+    ({"connectors": [{"kind": "lift", "levels": [0, 1], "outline": [[0, k] for k in range(10_001)]}]}, "outline"),
     ({"levels": [{"walls": [], "place_sd": [[0, 0, -1]]}]}, r"place_sd\[0\]\[2\]"),
 ]
 
@@ -149,7 +153,7 @@ def test_all_fields(tmp_path: Path) -> None:
 def same(one: Plan, other: Plan) -> None:
     """Everything but the digest, to the last bit."""
     assert (one.name, one.start, one.georeference) == (other.name, other.start, other.georeference)
-    assert one.uncertainty_m == other.uncertainty_m
+    assert (one.uncertainty_m, one.picture) == (other.uncertainty_m, other.picture)
     assert len(one.levels) == len(other.levels)
     assert len(one.connectors) == len(other.connectors)
     for a, b in zip(one.levels, other.levels, strict=True):
@@ -207,6 +211,7 @@ PLANS = st.builds(
     ).map(tuple),
     st.none() | st.builds(Georeference, st.floats(-180, 180), st.floats(-90, 90), DEGREES),
     st.none() | st.floats(0, 10),
+    st.none() | st.tuples(st.floats(1e-6, 1e4), METRES, METRES),
 )
 
 

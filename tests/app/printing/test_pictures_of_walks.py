@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import PatchCollection
 from matplotlib.colors import to_hex
-from matplotlib.patches import Ellipse
 
 import echostep
 from echostep.errors import EchostepError
@@ -47,11 +47,12 @@ def test_a_walk_is_drawn_in_outlines_on_its_plan(walk: echostep.Walk) -> None:
     doubtful = replace(end, t_s=end.t_s + 1.0, right=0.8, hypotheses=places, status=TrackStatus.UNCERTAIN, xx_m2=900.0)
     with track_figure(walk.plan, [*walk.estimates[:8], doubtful], None, "x") as figure:
         (axes,) = figure.axes
-    drawn = [patch for patch in axes.patches if isinstance(patch, Ellipse)]
-    assert not any(patch.get_fill() for patch in drawn)
-    assert [patch.get_alpha() for patch in drawn[-2:]] == [0.5, 0.3]
-    assert {to_hex(patch.get_edgecolor()) for patch in drawn} == {
-        WORDS[TrackStatus(word)] for word in ("tracking", "uncertain")
+    (drawn,) = (each for each in axes.collections if isinstance(each, PatchCollection))
+    assert not np.array(drawn.get_facecolor())[:, 3].any()
+    edges = np.array(drawn.get_edgecolor())
+    assert edges[-2:, 3].tolist() == [0.5, 0.3]
+    assert {to_hex(tuple(edge)) for edge in edges.tolist()} == {
+        WORDS[TrackStatus(w)] for w in ("tracking", "uncertain")
     }
     assert np.ptp(axes.get_xlim()) < 1.1 * np.ptp(walk.plan.levels[0].walls[:, ::2])
 

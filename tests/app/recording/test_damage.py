@@ -32,7 +32,6 @@ from recording.damages import arrival_offsets, flipped, message_records
 from walks import DEMO, walk_chunks
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(1200)]
-CHUNKS_A_SECOND = 50
 CHECKSUM = "its checksum is wrong"
 
 
@@ -63,17 +62,6 @@ def made(folder: Path, kind: str) -> bytes:
     else:
         repair(folder / "a.mcap", out)
     return out.read_bytes()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["cut", "repair"])
-def test_a_flipped_bit_of_what_we_write_costs_less_than_a_second(tmp_path: Path, kind: str) -> None:
-    whole, rng = made(tmp_path, kind), random.Random(1)
-    for _ in range(40):
-        path = tmp_path / "flip.mcap"
-        path.write_bytes(flipped(whole, rng.randrange(8, len(whole)), rng.randrange(8)))
-        found = read(path)[1]
-        assert sum(chunk in set(found) for chunk in CHUNKS) > len(CHUNKS) - CHUNKS_A_SECOND
 
 
 def test_a_flipped_bit_in_a_chunk_that_is_not_compressed_is_told_without_the_files_own_checksum(tmp_path: Path) -> None:

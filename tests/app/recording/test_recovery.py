@@ -96,6 +96,14 @@ def test_a_file_whose_close_fails_is_told_and_ends_no_run(tmp_path: Path, monkey
     assert (tmp_path / "a.mcap").read_bytes() == b"bytes"
 
 
+def test_a_file_that_is_removed_while_it_is_written_is_told(tmp_path: Path) -> None:
+    writer = BackgroundWriter(tmp_path / "a.mcap")
+    (tmp_path / "a.mcap").unlink()
+    writer.close()
+    said = [f"{tmp_path / 'a.mcap'}: was removed while it was written; nothing of it is left"]
+    assert (list(writer.notices), writer.is_whole) == (said, False)
+
+
 def test_a_disk_that_stands_still_does_not_keep_the_tracker_waiting(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

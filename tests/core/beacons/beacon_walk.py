@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A simulated walk with a gateway."""
+"""A simulated walk with a gateway, and what any gateway hears on a simulated walk."""
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 from operator import attrgetter
@@ -11,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from echostep.arrays import Floats
 from echostep.plan import Plan, load_plan
+from echostep.ports.chunks import Chunk
 from echostep.tracker import Tracker
 from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 from echostep_simulation.devices.board import PythonBoard
@@ -24,6 +27,18 @@ def demo() -> Plan:
     return load_plan(Path(str(files("echostep") / "plans" / "demo.json")))
 
 
+def heard(truth: Floats, places: Floats) -> list[Chunk]:
+    """What a gateway hears, on a true path (n, 3 or more) in the demo office, of beacons at these places (k, 3)."""
+    arrival_ns = START_NS + np.rint(1e9 * truth[:, 0]).astype(np.int64)
+    world = BeaconWorld(places, demo().levels[0].walls)
+    return list(gateway_chunks(world, truth[:, 0], truth[:, 1:3], arrival_ns, SEED))
+
+
+def merged(*streams: Iterable[Chunk]) -> list[Chunk]:
+    """Chunks in order of arrival."""
+    return list(heapq.merge(*streams, key=attrgetter("t_arrival_ns")))
+
+
 class Walk:
     def __init__(self) -> None:
         self.plan = demo()
@@ -32,10 +47,7 @@ class Walk:
         self.alone = list(scenario.chunks())
         scenario.close()
         self.places = lay_beacons(self.truth[:, 1:3], 5.0, np.random.default_rng(SEED))
-        arrival_ns = START_NS + np.rint(1e9 * self.truth[:, 0]).astype(np.int64)
-        world = BeaconWorld(self.places, self.plan.levels[0].walls)
-        said = gateway_chunks(world, self.truth[:, 0], self.truth[:, 1:3], arrival_ns, SEED)
-        self.chunks = list(heapq.merge(self.alone, said, key=attrgetter("t_arrival_ns")))
+        self.chunks = merged(self.alone, heard(self.truth, self.places))
 
     def tracker(self) -> Tracker:
         return Tracker(self.plan, self.start, seed=SEED)

@@ -3,25 +3,22 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 import random
-from operator import attrgetter
 
 import numpy as np
 import pytest
 
-from beacons.beacon_walk import SEED, Walk, beacon_walk, demo
+from beacons.beacon_walk import SEED, Walk, beacon_walk, demo, heard, merged
 from echostep.angles import mean_angle
 from echostep.localization import Start, digest
 from echostep.localization.belief import CloudHypothesis
 from echostep.plan import Pose
 from echostep.ports.chunks import GATEWAY, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Waypoint
-from echostep_simulation.scenario import START_NS, Scenario
+from echostep_simulation.scenario import Scenario
 
 
 @pytest.fixture(scope="module")
@@ -77,19 +74,14 @@ def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, st
     """The states of the beacons about a walk in the corridor, of which number 2 dies."""
     plan = demo()
     scenario = Scenario(plan, path, SEED, PythonBoard(seed=SEED))
-    t_s, xy_m = scenario.truth[:, 0], scenario.truth[:, 1:3]
+    truth = scenario.truth
     places = np.array([(3.0, 7.4, 0.0), (8.5, 7.6, 1.0), (9.5, 10.8, 2.0)])
     after = np.where(np.arange(3)[:, None] == 1, 500.0, places)
-    arrival_ns = START_NS + np.rint(1e9 * t_s).astype(np.int64)
-    walls, early = plan.levels[0].walls, t_s < min(dies_s, t_s[-2])
-    said = [
-        *gateway_chunks(BeaconWorld(places, walls), t_s[early], xy_m[early], arrival_ns[early], SEED),
-        *gateway_chunks(BeaconWorld(after, walls), t_s[~early], xy_m[~early], arrival_ns[~early], SEED),
-    ]
+    early = truth[:, 0] < min(dies_s, truth[-2, 0])
     tracker = Tracker(plan, scenario.start, seed=SEED)
-    tracker.take(portion_of(list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))))
+    tracker.take(portion_of(merged(scenario.chunks(), heard(truth[early], places), heard(truth[~early], after))))
     assert tracker.filter
-    found = tracker.filter.beacon_map.places(tracker.filter.cloud, t_s[-1])
+    found = tracker.filter.beacon_map.places(tracker.filter.cloud, truth[-1, 0])
     return {tracker.gateway.numbers[p.slot]: p.state.value for p in found}
 
 
@@ -105,7 +97,6 @@ def test_a_beacon_that_dies_is_noticed_and_one_behind_a_wall_is_not_blamed() -> 
 def test_nonsense_at_the_gateways_port_changes_no_estimate(walk: Walk) -> None:
     rng = random.Random(SEED)
     noise = [Chunk(GATEWAY, c.t_arrival_ns, rng.randbytes(200) + b"\0") for c in walk.alone[::200]]
-    noisy = list(heapq.merge(walk.alone, noise, key=attrgetter("t_arrival_ns")))
     quiet, disturbed = walk.tracker(), walk.tracker()
-    assert digest(quiet.take(portion_of(walk.alone))) == digest(disturbed.take(portion_of(noisy)))
+    assert digest(quiet.take(portion_of(walk.alone))) == digest(disturbed.take(portion_of(merged(walk.alone, noise))))
     assert disturbed.gateway.counts.broken >= len(noise)

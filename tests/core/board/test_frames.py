@@ -64,37 +64,6 @@ def test_generated_files_are_fresh() -> None:
     assert done.returncode == 0, done.stdout
 
 
-@given(st.binary(max_size=600), st.lists(st.integers(0, 600), max_size=8))
-def test_any_split_gives_the_same(noise: bytes, cuts: list[int]) -> None:
-    stream = b"".join(encode(gyros(n), n) for n in range(12)) + noise + b"\0" + encode(gyros(99), 12)
-    whole, split = BoardReader(), BoardReader()
-    expected = whole.feed(stream)
-    edges = sorted({0, len(stream), *(c % len(stream) for c in cuts)})
-    found = [x for a, b in zip(edges, edges[1:], strict=False) for x in split.feed(stream[a:b])]
-    assert found == expected
-    assert split.counts == whole.counts
-    assert found[:12] == [gyros(n) for n in range(12)]
-    assert found[-1] == gyros(99)
-
-
-@given(st.sampled_from(["flip", "drop", "insert"]), st.data())
-def test_damage_costs_only_the_frames_it_touches(kind: str, draw: st.DataObject) -> None:
-    frames = [encode(gyros(n), n) for n in range(20)]
-    stream = bytearray(b"".join(frames))
-    at = draw.draw(st.integers(0, len(stream) - 1))
-    if kind == "flip":
-        stream[at] ^= draw.draw(st.integers(1, 255))
-    elif kind == "drop":
-        del stream[at]
-    else:
-        stream.insert(at, draw.draw(st.integers(0, 255)))
-    reader = BoardReader()
-    found = reader.feed(bytes(stream))
-    assert len(found) >= 18  # a damaged closing zero joins two frames, never more
-    assert set(found) <= {gyros(n) for n in range(20)}
-    assert found == sorted(found)
-
-
 def seen(reader: BoardReader | NaiveReader, parts: list[bytes]) -> tuple[list[m.Message], FrameCounts, bool]:
     """Messages and counts, and whether a stale firmware ended it."""
     found: list[m.Message] = []

@@ -47,21 +47,25 @@ def motion(ticks: int, force: np.ndarray) -> m.Motion:
     return m.Motion(ticks, *([-32768] * 15), *np.rint(force / 9.81 * 4_098).astype(int).tolist())
 
 
-def frames(seed: int, heading: float) -> bytes:
-    """Five seconds of a tilted belt that shakes at the step's frequency."""
-    r, rng = axes_of(heading, 0.1, -0.2), np.random.default_rng(seed)
+def frames(forces: np.ndarray, r: np.ndarray) -> bytes:
+    """Of a belt with these axes that measures forces (n, 3), 200 a second, and the field ten times a second."""
     sent = b""
-    for k in range(1_000):
-        shake = 3.0 * math.sin(2.0 * math.pi * 1.8 * k / 200.0)
-        force = r.T @ np.array([shake, 0.0, 9.81]) + 0.05 * rng.standard_normal(3)
+    for k, force in enumerate(forces):
         sent += encode(motion(k * 10_000, force), 0)
         if k % 20 == 19:
             sent += encode(m.Magnetic(k * 10_000, *np.rint(6_842 * r.T @ NORTH_AND_DOWN).astype(int).tolist()), 0)
     return sent
 
 
+def shaken(seed: int, heading: float) -> bytes:
+    """Five seconds of a tilted belt that shakes at the step's frequency."""
+    r, shake = axes_of(heading, 0.1, -0.2), 3.0 * np.sin(2.0 * math.pi * 1.8 * np.arange(1_000) / 200.0)
+    forces = np.column_stack([shake, np.zeros(1_000), np.full(1_000, 9.81)]) @ r
+    return frames(forces + 0.05 * np.random.default_rng(seed).standard_normal((1_000, 3)), r)
+
+
 def test_the_steps_average_out_and_portions_change_no_bit() -> None:
-    sent = frames(1, 1.1)
+    sent = shaken(1, 1.1)
     whole = TiltCompass().headings(BoardReader().frames(sent))[1]
     assert np.degrees(np.abs(whole[20:] - 1.1)).max() < 2.0
     reader, cut, parts = BoardReader(), TiltCompass(), []
@@ -77,11 +81,8 @@ def test_a_saturated_or_missing_field_is_no_heading() -> None:
 
 def test_an_offset_of_the_belts_accelerometer_is_taken_out() -> None:
     """50 mg are three degrees of tilt, and five of heading where the field dips by 66 degrees."""
-    offset, gain, sent = np.array([0.4, -0.45, 0.2]), np.array([1.01, 0.99, 1.005]), b""
-    for k in range(400):
-        sent += encode(motion(k * 10_000, gain * np.array([0.0, 0.0, 9.81]) + offset), 0)
-        if k % 20 == 19:
-            sent += encode(m.Magnetic(k * 10_000, *np.rint(6_842 * NORTH_AND_DOWN).astype(int).tolist()), 0)
+    offset, gain = np.array([0.4, -0.45, 0.2]), np.array([1.01, 0.99, 1.005])
+    sent = frames(np.tile(gain * np.array([0.0, 0.0, 9.81]) + offset, (400, 1)), np.eye(3))
     errors = ImuSettings(*offset.tolist(), *(1.0 / gain).tolist())
     bare, corrected = (TiltCompass(e).headings(BoardReader().frames(sent))[1][-1] for e in (None, errors))
     assert abs(bare) > math.radians(4.0)

@@ -124,6 +124,19 @@ def test_a_segment_is_its_moves_and_pings_one_by_one(seed: int, turn_sd_deg: flo
     assert log_passed == pytest.approx(wanted.log_passed, abs=0.02)
 
 
+def test_a_cloud_that_leaves_the_tables_asks_for_them_before_its_ping() -> None:
+    arrays = ParticleArrays(np.array([1.0, 1.0]), np.array([1.0, 2.0]), np.zeros(2), np.ones(2), np.zeros(2))
+    one = np.ones(1)
+    pings = PingBatch(0.5 * one, one, one, one, np.zeros(1, np.int64), one, 0.1 * one, 0.0 * one, one, one)
+    walls, model, memory = Walls(ROOMS), CloudModel(6.0, 0.0, ROUGH), (np.zeros((2, 2)), np.zeros(1))
+    progress = MoveProgress(0.0, 0)
+    for expected in (MoveProgress(0.5, 0), MoveProgress(1.0, 1)):
+        move, index = Move(4.0, 0.0, 0.0, 0.0), walls.near(arrays.x_m, arrays.y_m)
+        progress, *_ = propagate_and_reweight(arrays, move, np.zeros((5, 2)), progress, pings, model, index, *memory)
+        assert progress == expected
+    assert arrays.x_m == pytest.approx(5.0)
+
+
 @given(st.integers(0, 2**32))
 @settings(max_examples=200, deadline=None)
 def test_sources_that_are_left_out_change_no_density(seed: int) -> None:

@@ -87,3 +87,15 @@ def test_any_portions_give_the_same_bits_and_broken_fields_are_passed_over() -> 
     assert walk_track(t, accel, gyro, mag=mag * np.nan).compass == (0, 0)
     with pytest.raises(ValueError, match="mag as gyro"):
         foot.feed(t, accel, gyro, mag[1:])
+
+
+@pytest.mark.slow
+def test_after_a_gap_north_is_found_anew() -> None:
+    """The foot has turned unseen. Its heading is a new one, and stays: it is not drawn towards the former one from step to step."""
+    t, accel, gyro, mag = walked("walking", EARTH, 1)
+    c, s = np.cos(1.0), np.sin(1.0)
+    later = walked("walking", EARTH @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), 1)[3]
+    kept = ~((t > 50.0) & (t < 51.5))
+    track = walk_track(t[kept], accel[kept], gyro[kept], mag=np.where(t[:, None] < 51.0, mag, later)[kept])
+    after = np.unwrap(track.heading_rad[t[kept] > 53.0])[: 10 * RATE_HZ]
+    assert np.ptp(after) < 0.12 + DRIFT_RAD_S * 10.0

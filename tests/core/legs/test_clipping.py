@@ -21,10 +21,16 @@ def swings() -> tuple[Floats, Floats, Floats]:
     return t, true, np.clip(true, -LIMIT, LIMIT)
 
 
+def told(t: Floats, rates: Floats, size: int) -> Floats:
+    """Times and repaired rates (n, 3), fed in portions of this size."""
+    one = ClippingRepair(np.full(2, -LIMIT), np.full(2, LIMIT))
+    parts = [np.column_stack(one.feed(t[k : k + size], rates[k : k + size])) for k in range(0, len(t), size)]
+    return np.vstack([*parts, np.column_stack(one.finish())])
+
+
 def test_a_cut_off_swing_keeps_its_angle() -> None:
     t, true, clipped = swings()
-    one = ClippingRepair(np.full(2, -LIMIT), np.full(2, LIMIT))
-    repaired = np.vstack([one.feed(t, clipped)[1], one.finish()[1]])
+    repaired = told(t, clipped, len(t))[:, 1:]
     lost, left = (float(np.abs((true - rates).sum(axis=0) * 0.01).max()) for rates in (clipped, repaired))
     assert lost > 0.05
     assert left < 0.15 * lost
@@ -32,18 +38,9 @@ def test_a_cut_off_swing_keeps_its_angle() -> None:
 
 def test_portions_do_not_matter() -> None:
     t, _, clipped = swings()
-    low, high = np.full(2, -LIMIT), np.full(2, LIMIT)
-
-    def told(size: int) -> Floats:
-        one = ClippingRepair(low, high)
-        parts: list[Floats] = []
-        for k in range(0, len(t), size):
-            parts.append(np.column_stack(one.feed(t[k : k + size], clipped[k : k + size])))
-        return np.vstack([*parts, np.column_stack(one.finish())])
-
-    assert np.array_equal(told(20), told(1))
-    assert np.array_equal(told(7), told(10_000))
-    assert np.array_equal(told(7)[:, 0], t)
+    one = told(t, clipped, 1)
+    assert all(np.array_equal(told(t, clipped, size), one) for size in (7, 20, 10_000))
+    assert np.array_equal(one[:, 0], t)
 
 
 def test_a_sensor_stuck_at_its_end_is_passed_on() -> None:

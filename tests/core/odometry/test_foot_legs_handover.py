@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
+from echostep.legs.strides import BLIND_SD_M
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.localization import Estimate, TrackStatus, digest
 from echostep.odometry.foot_legs_handover import ALIGNED_SD, KEPT_S, FootLegsHandover
@@ -95,17 +96,19 @@ def test_twenty_metres_of_both_give_the_scale_of_the_legs() -> None:
             return 0.0
 
     handover = FootLegsHandover(WearerSettings())
-    handover._kept_segments.extend(leg(float(k), k + 1.0) for k in range(20))
-    legs = [replace(leg(float(k), k + 1.0, 0.9), scale_sd=0.078) for k in range(20)]
+    handover._kept_segments.extend(leg(float(k), k + 1.0) for k in range(-5, 20))
+    # The first strides, whose length they do not see, are none of length 0
+    blind = [replace(leg(float(k), k + 1.0, 0.0), sd_m=BLIND_SD_M) for k in range(-5, 0)]
+    legs = blind + [replace(leg(float(k), k + 1.0, 0.9), scale_sd=0.078) for k in range(20)]
     assert handover._align_legs(Path(), legs)  # type: ignore[arg-type]
-    assert handover._as_common(legs[0]).dx_m == pytest.approx(1.0, abs=0.001)
-    assert ALIGNED_SD < handover._as_common(legs[0]).scale_sd < 0.03
+    assert handover._as_common(legs[-1]).dx_m == pytest.approx(1.0, abs=0.001)
+    assert ALIGNED_SD < handover._as_common(legs[-1]).scale_sd < 0.03
     first = handover._leg_scale
     handover._kept_segments.clear()
     handover._kept_segments.extend(leg(float(k), k + 1.0, 1.1) for k in range(20))
     assert handover._align_legs(Path(), legs)  # type: ignore[arg-type]
     assert first < handover._leg_scale < 1.1 / 0.9  # both dropouts count
-    assert FootLegsHandover(WearerSettings())._as_common(legs[0]) == legs[0]
+    assert FootLegsHandover(WearerSettings())._as_common(legs[-1]) == legs[-1]
 
 
 def test_nobody_who_lies_still_is_believed_to_stand() -> None:
@@ -180,6 +183,16 @@ def test_the_foot_takes_over_again() -> None:
     late = np.array([e.t_s for e in estimates]) > 55.0
     assert error[late].mean() < 0.2
     assert max(b.t_s - a.t_s for a, b in zip(estimates, estimates[1:], strict=False)) < 3.5
+
+
+def test_a_plug_that_is_loose_again_and_again_is_bridged_by_the_legs() -> None:
+    """For 1 to 5 s in turn, every 12 s; after a long one the foot has measured one stride before the next."""
+    scenario, chunks = walked(1)
+    for k in range(5):
+        chunks = tuple(without(chunks, MTX, 20.0 + 12.0 * k, 21.0 + 13.0 * k))
+    estimates, error = tracked(scenario, list(chunks))
+    assert error.max() < 0.5
+    assert np.mean([e.status is TrackStatus.TRACKING for e in estimates]) > 0.9
 
 
 @pytest.mark.parametrize("seed", [2, 3, 6, 9])

@@ -60,22 +60,6 @@ def test_the_slope_is_the_most_probable_one() -> None:
         assert found == pytest.approx(best, abs=2e-8)
 
 
-def test_there_and_back() -> None:
-    clock = new_clock(1.0, 1 << 16)
-    for n, a in enumerate(through_an_adapter(80.0, 0.0, False, 2)[0]):
-        line.update(clock, 0.01 * n, round(a * 1e9))
-    for d in (0.0, 12.3, 29.0, 40.0):
-        assert line.to_device_s(clock, line.to_arrival_s(clock, d)) == pytest.approx(d, abs=1e-9)
-
-
-def test_the_lower_hull_lies_below_all_points() -> None:
-    rng = np.random.default_rng(3)
-    x, y = np.arange(40.0), rng.random(40)
-    hull = lower_hull(x, y)
-    assert (np.interp(x, x[hull], y[hull]) <= y + 1e-12).all()
-    assert (hull[0], hull[-1]) == (0, 39)
-
-
 @given(st.lists(st.tuples(st.floats(-5, 200), st.floats(0, 0.5)), max_size=150))
 def test_bit_for_bit_like_the_naive_twin(points: list[tuple[float, float]]) -> None:
     clock, naive = new_clock(1.0, 1 << 16), NaiveClock()

@@ -68,19 +68,6 @@ def test_long_frames_are_read_in_captures_and_hold_nothing_back_on_a_port() -> N
     assert live.counts.skipped_bytes >= 6
 
 
-@given(st.binary(max_size=300), st.lists(st.integers(0, 1500), max_size=8))
-def test_any_split_gives_the_same(noise: bytes, cuts: list[int]) -> None:
-    stream = b"".join(frame(n) for n in range(8)) + noise + b"".join(frame(n) for n in range(8, 60))
-    whole, split = MtxReader(), MtxReader()
-    expected = whole.feed(stream)
-    edges = sorted({0, len(stream), *(c % len(stream) for c in cuts)})
-    found = [s for a, b in zip(edges, edges[1:], strict=False) for s in split.feed(stream[a:b])]
-    assert found == expected
-    assert split.counts == whole.counts
-    assert [s.counter for s in found[:8]] == list(range(8))
-    assert found[-1].counter == 59
-
-
 @given(st.integers(0, 20 * 59 - 1), st.integers(1, 255))
 def test_a_flipped_byte_costs_one_frame(at: int, flip: int) -> None:
     stream = bytearray(b"".join(frame(n) for n in range(60)))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely import LineString, MultiLineString
 
@@ -20,7 +20,6 @@ from echostep_studies.frame.report import rows_by_name, summary
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.girard2011 import kit_feet, kits, study
 from echostep_studies.papers.girard2011 import Girard, GirardSettings, average, disc, merge, moved, similarity
-from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 from echostep_studies.simulation import sites
 from echostep_studies.simulation.marker_walk import STEP_M, lay_markers, walk_markers
 from echostep_studies.simulation.sites import otb
@@ -88,25 +87,6 @@ def test_equation_1_of_a_perfect_match_and_of_no_echo() -> None:
 
 def test_equation_2() -> None:
     assert average(np.array([0.0, 4.0]), np.array([2.0, 2.0]), np.array([3.0, 1.0])) == (1.0, 2.0)
-
-
-@pytest.mark.long
-@given(st.floats(0.1, 4.9), st.floats(0.1, 2.9), st.floats(-math.pi, math.pi))
-@settings(max_examples=50)
-def test_equation_3_by_plain_rays(x: float, y: float, heading: float) -> None:
-    """The reading from visible reflectors is that of seven rays which stop at the first wall."""
-    walls = Walls(ROOM, 0.5 * PRINTED.aperture_rad / PRINTED.rays)
-    at = np.array([x]), np.array([y])
-    cone = (
-        PRINTED.rays,
-        PRINTED.aperture_rad,
-        PRINTED.maximum_m,
-    )  # given, so that no other kernel is compiled than the filter's
-    found = lambda_ray_ranges(at[0], at[1], np.array([heading]), walls.near(*at), *cone)[0]
-    for ranger, axis in enumerate((0.5 * math.pi, -0.5 * math.pi)):
-        twin = naive.cone_reading(x, y, heading + axis, ROOM, 7, PRINTED.aperture_rad, 6.0)
-        nearly = naive.cone_reading(x, y, heading + axis, ROOM, 7, PRINTED.aperture_rad * (1 - 1e-9), 6.0)
-        assert found[ranger] == pytest.approx(twin, abs=1e-9) or abs(twin - nearly) > 1e-6
 
 
 def test_a_step_without_echoes_moves_and_merges_as_the_twin() -> None:

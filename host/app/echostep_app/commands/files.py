@@ -19,6 +19,7 @@ from echostep_app.commands.options import (
     Start,
     Thigh,
     Units,
+    example,
     of_kind,
     out_option,
     picture_option,
@@ -45,7 +46,7 @@ def map_command(
     mapping.map_recording(recording, out, picture)
 
 
-@app.command("import")
+@app.command("import", epilog=example("echostep import imu.csv --pressure pressure.csv -o walk.mcap"))
 def import_command(
     imu: Annotated[Path, typer.Argument(help="Recording of a foot IMU: a file, folder or zip, as of foot.")],
     out: Annotated[Path, out_option("OUT", "The recording to write.")],
@@ -70,7 +71,7 @@ def import_command(
     offline.import_foot(imu, out, parse_naming(columns, units), Beside(pressure, ranges, legs, settings), truth)
 
 
-@app.command()
+@app.command(epilog=example("echostep foot imu.csv --plan building.dxf --start 2,7.5,0"))
 def foot(
     imu: Annotated[
         Path, typer.Argument(help="CSV: t_s,ax,ay,az,gx,gy,gz[,mx,my,mz] in s, m/s2, rad/s; or another program's.")
@@ -167,7 +168,7 @@ def floors(
     offline.floors(pressure, heights, out, start, picture, parse_naming(columns, units))
 
 
-@app.command()
+@app.command(epilog=example("echostep score track.csv --truth truth.csv --plan plan.json"))
 def score(
     tracks: Annotated[
         list[Path],

@@ -51,6 +51,11 @@ def picture_file(option: typer.CallbackParam, path: Path | None) -> Path | None:
     return path
 
 
+def example(line: str) -> str:
+    """The end of a command's help: a command that can be typed, in one line."""
+    return f"\b\nExample:\n  {line}"
+
+
 def out_option(kind: str, text: str) -> Any:
     """The option of what a command writes: a folder (DIR), or a file."""
     return typer.Option("--out", "-o", metavar=kind, callback=lambda path: of_kind(path, kind == "DIR"), help=text)
@@ -114,9 +119,8 @@ Start = Annotated[
     str | None,
     typer.Option(
         "--start",
-        metavar="X,Y,DEG[,LEVEL]|ROOM|?|last",
-        help="Position and heading of the wearer at the start (level 0 is the plan's first, ? any), a room, ? for anywhere, or last: "
-        "where the last live run of this folder ended (live only).",
+        metavar="X,Y,DEG[,LEVEL]|ROOM|?",
+        help="Position and heading of the wearer at the start (level 0 is the plan's first, ? any), a room, or ? for anywhere.",
     ),
 ]
 StartSd = Annotated[

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from echostep.errors import EchostepError
-from echostep_app.commands.options import Browser, Lang, out_option, picture_option
+from echostep_app.commands.options import Browser, Lang, example, out_option, picture_option, rectangle
 from echostep_app.extras import PAGE, lacks, require
 from echostep_app.printing.lines import say
 
@@ -25,13 +25,10 @@ MARK = b"echostep plan"  # in the header of the pictures that the drawing writes
 
 app = typer.Typer(no_args_is_help=True, help="Plans: import, check, show, edit.")
 
-
 Files = Annotated[
     list[Path],
     typer.Argument(metavar="FILE", help="A building in another format: a file or folder; DXF: one file a storey."),
 ]
-
-
 Storey = Annotated[
     float, typer.Option("--storey", metavar="M", help="Height of a storey where the file has none.", min=1.0, max=50.0)
 ]
@@ -79,7 +76,7 @@ Doors = Annotated[
 ]
 
 
-@app.command("import")
+@app.command("import", epilog=example("echostep plan import building.dxf --units mm -o plan.json"))
 def import_(
     files: Files,
     out: Annotated[Path, out_option("PLAN", "The plan to write (JSON).")],
@@ -101,16 +98,8 @@ def import_(
     from echostep_app.plan.questions import with_questions
     from echostep_app.plan.writer import save_plan
 
-    hints = Hints(
-        storey,
-        unit_of(units),
-        layers_of(layer or []),
-        doors,
-        scale_of(scale, units),
-        windows_of(window or []),
-        level or [],
-        align,
-    )
+    layers, windows = layers_of(layer or []), windows_of(window or [])
+    hints = Hints(storey, unit_of(units), layers, doors, scale_of(scale, units), windows, level or [], align)
     plan, report = import_reported(files[0], hints, files[1:])
     plan = with_questions(plan)
     save_plan(plan, out)
@@ -153,11 +142,8 @@ def _without(letters: str) -> str:
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]
 
 
-@app.command()
-def check(
-    file: PlanFile,
-    picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None,
-) -> None:
+@app.command(epilog=example("echostep plan check plan.json --picture faults.png"))
+def check(file: PlanFile, picture: Annotated[Path | None, picture_option("Draw what is wrong")] = None) -> None:
     """List the faults of a plan: exit status 0 without any, 1 otherwise."""
     from echostep_app.plan.check import check_plan
     from echostep_app.plan.importers.limited import open_limited
@@ -197,14 +183,12 @@ def show(
 
     plan = open_limited(file)
     levels = list(range(len(plan.levels))) if level is None else [_level(plan, level)]
-    say(f"picture: {out}{_without(draw_plan(plan, out, levels, _bounds(bounds)))}")
+    part = None if bounds is None else rectangle("--bounds", bounds, 1e6, "metres")
+    say(f"picture: {out}{_without(draw_plan(plan, out, levels, part))}")
 
 
 @app.command()
-def overlay(
-    file: PlanFile,
-    out: Annotated[Path, out_option("FILE", "The overlay to write (.kmz).")],
-) -> None:
+def overlay(file: PlanFile, out: Annotated[Path, out_option("FILE", "The overlay to write (.kmz).")]) -> None:
     """Make a picture of each storey that lies on the map: in ATAK (GRG), Google Earth, QGIS."""
     require(str(out), "matplotlib", "pyproj")
     from echostep_app.plan.importers.limited import open_limited
@@ -241,9 +225,3 @@ def _level(plan: Plan, name: str) -> int:
     if name.isascii() and name.isdigit() and int(name) < len(names):
         return int(name)
     raise EchostepError(f"--level {name}: the levels are {', '.join(names)[:300]}")
-
-
-def _bounds(text: str | None) -> tuple[float, float, float, float] | None:
-    from echostep_app.commands.options import rectangle
-
-    return None if text is None else rectangle("--bounds", text, 1e6, "metres")

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import OptionalPlan, RecordedSeed, SettingsFile, out_option
+from echostep_app.commands.options import OptionalPlan, RecordedSeed, SettingsFile, example, out_option
 from echostep_app.printing.lines import say
 from echostep_app.printing.people import outlast_output
 
@@ -47,12 +47,12 @@ def cut(
     say(*edit.cut(file, begin_s, end_s, out))
 
 
-@app.command()
+@app.command(epilog=example("echostep export walk.mcap --plan plan.json -o track.geojson"))
 def export(
     file: Recording,
     out: Annotated[
         Path,
-        out_option("OUT", "track.csv, .parquet, .gpkg, .kml, .gpx, .tum, or .mcap with derived messages."),
+        out_option("OUT", "track.csv, .parquet, .gpkg, .geojson, .kml, .gpx, .tum, or .mcap with derived messages."),
     ],
     plan: OptionalPlan = None,
     start: Annotated[

@@ -7,7 +7,7 @@ In: the command's arguments and options. Out: files, views. Slow imports wait un
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,18 +22,16 @@ from echostep_app.commands.options import (
     Port,
     RecordedSeed,
     Seed,
+    example,
     out_option,
     page_address,
 )
 from echostep_simulation.kits import Kit
 
-if TYPE_CHECKING:
-    pass
-
 app = typer.Typer()
 
 
-@app.command()
+@app.command(epilog=example("echostep demo --out out/demo --seed 2"))
 @with_groups
 def demo(
     output: Output,
@@ -73,7 +71,7 @@ def demo(
     demo_run.demo(demo_run.DemoOptions(seed, board_command, guide, plan, speed, kit, celsius), outputs)
 
 
-@app.command()
+@app.command(epilog=example("echostep live --plan plan.json --board /dev/ttyACM0 --mtx /dev/ttyUSB0 --start 2,7.5,0"))
 @with_groups
 def live(
     tracking: Tracking,
@@ -82,14 +80,14 @@ def live(
     out: Out = Path("out/live"),
     seed: Seed = 0,
 ) -> None:
-    """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used."""
+    """Track a wearer live and record everything. With nothing on the foot the board's leg gyros are used. --start last: where the last run ended."""
     from echostep_app.session.runs import live as live_run
 
     outputs = output.options(out)
     live_run.live(tracking.options(seed), ports.options(), outputs)
 
 
-@app.command()
+@app.command(epilog=example("echostep record --board /dev/ttyACM0 --seconds 60 -o walk.mcap"))
 @with_groups
 def record(
     ports: Ports,
@@ -101,7 +99,7 @@ def record(
     live_run.record(ports.options(), out)
 
 
-@app.command()
+@app.command(epilog=example("echostep replay out/live/walk.mcap --plan plan.json --start Lab"))
 @with_groups
 def replay(
     recording: Annotated[

@@ -43,7 +43,7 @@ def load_foot(path: Path, naming: Naming = OWN) -> Imu:
     """Samples of a file or folder of any program."""
     if path.is_dir():
         return _folder(path, path.glob("*.csv"), naming)
-    if zipfile.is_zipfile(path):
+    if path.is_file() and zipfile.is_zipfile(path):
         return _zip(path, naming)
     reader = {".mat": _mat, ".mvnx": _mvnx}.get(path.suffix.lower())
     if reader is None:

@@ -86,7 +86,7 @@ LOGGERS = (
     Logger("phyphox", {"t_s": "Time (s)", "pressure_pa": "Pressure (hPa)"}),
     Logger("Sensor Logger", {"t_s": "seconds_elapsed", "pressure_pa": "pressure"}, units={"pressure": "hPa"}),
     Logger("Movella DOT", {"t_s": CLOCK} | XSENS, XSENS_MAG, {"rate": "deg/s"}, DOT),
-    Logger("MT Manager", {"t_s": COUNTER} | XSENS, XSENS_MAG),
+    *(Logger("MT Manager", {"t_s": counter} | XSENS, XSENS_MAG) for counter in (COUNTER, CLOCK)),
     *(Logger("SensorLog", SENSORLOG | _axes("g", gyro), units={"force": "-g"}) for gyro in SENSORLOG_GYROS),
     Logger("SensorConnect", {"t_s": "Time"} | MSCL, _axes("m", "scaledMag{}"), {"force": "g"}),
     Logger("gaitmap, its left sensor", {"t_s": "index"} | GAITMAP, units={"rate": "deg/s"}),
@@ -123,10 +123,12 @@ def parse_naming(columns: str | None, units: str | None) -> Naming:
 def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     """The names of the columns, taken from the lines with all lines above them; raises ValueError for missing names."""
     above, text = _preamble(lines)
-    theirs, separator = _titles(text, above)
+    line, (theirs, separator) = len(above) + 1, _titles(text, above)
     columns, units = dict(naming.columns), dict(naming.units)
     notes: tuple[str, ...] = ()
     names = [_own(title) for title in theirs]
+    if not above and separator == "," and CLOCK in theirs:
+        above = [DOT]  # which its program leaves out on request; MT Manager separates by tabs
     if not columns and "t_s" not in names:
         columns, more, notes = _recognised(theirs, above)
         units = more | units
@@ -137,7 +139,7 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, theirs, units)
     advice = ("" if naming.columns else proposal(theirs)) or ADVICE
-    return Header(names, separator, len(above) + 1, factors, counts_hz, period, notes, advice)
+    return Header(names, separator, line, factors, counts_hz, period, notes, advice)
 
 
 def _preamble(lines: Iterator[str]) -> tuple[list[str], str]:

@@ -58,15 +58,11 @@ def load_pair(paths: Sequence[Path], naming: Naming = OWN) -> tuple[LegSamples, 
     """Samples of one leg or of both, from one file or two; the notes on the other leg say so. Raises EchostepError."""
     if len(paths) > 2:
         raise EchostepError(f"{len(paths)} files: a person has two legs, give one file or two")
-    if len(paths) == 1 and not open_samples(paths[0], partial(_has_other, naming=naming)):
+    names = open_samples(paths[0], lambda file: read_header(lines_of(file, CsvLimits()), naming).names)
+    if len(paths) == 1 and not any(name.startswith(OTHER) for name in names):
         return (load_legs(paths[0], "", naming),)
     other = load_legs(paths[-1], OTHER if len(paths) == 1 else "", naming)
     return load_legs(paths[0], "", naming), replace(other, notes=tuple(f"other leg: {note}" for note in other.notes))
-
-
-def _has_other(file: TextIO, naming: Naming) -> bool:
-    """Whether the header names columns of the other leg."""
-    return any(name.startswith(OTHER) for name in read_header(lines_of(file, CsvLimits()), naming).names)
 
 
 def load_legs(path: Path | str, prefix: str = "", naming: Naming = OWN) -> LegSamples:

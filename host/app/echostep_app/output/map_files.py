@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Tracks for maps: GeoPackage for geographic information systems, KML, GPX for maps and outdoor programs.
+"""Tracks for maps: GeoPackage and GeoJSON for geographic information systems, KML, GPX for maps and outdoor programs.
 
-In: a track on a georeferenced plan. Out: an SQLite file [OGC 12-128r19, GeoPackage 1.4], KML, GPX [Topografix, GPX 1.1 schema], in longitude and
-latitude. Owns nothing. GPX has no heights: `ele` is metres above the sea, to which a plan's heights are not tied.
+In: a track on a georeferenced plan, of GeoJSON on any. Out: an SQLite file [OGC 12-128r19, GeoPackage 1.4], GeoJSON [RFC 7946], KML, GPX [Topografix,
+GPX 1.1 schema], in longitude and latitude. Owns nothing. GPX has no heights: `ele` is metres above the sea, to which a plan's heights are not tied.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import sqlite3
 import struct
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +25,7 @@ from echostep.file_mode import claim
 from echostep.localization import Estimate
 from echostep.plan import Plan
 from echostep.walk.table import Columns, columns_of
+from echostep_app.extras import require
 from echostep_app.output.derived import outline95
 from echostep_app.plan.georeference import earth_of
 from echostep_app.printing.lines import moment
@@ -138,6 +141,36 @@ def _blob(places: Floats, kind: str) -> bytes:
     begin = struct.pack("<2sBBi", b"GP", 0, 1, WGS84)
     shape = struct.pack("<BI", 1, 1) if kind == "POINT" else struct.pack("<BII", 1, 2, len(places))
     return begin + shape + places.astype("<f8").tobytes()
+
+
+def write_geojson(out: Path, track: TrackOnPlan) -> None:
+    """The estimates as points with all their columns, the 95 % radius (m) and the time of day, and the stretches of the track as lines.
+
+    Without a georeference places are in metres of the plan, and the file says so.
+    """
+    columns = flat(columns_of(track.estimates, track.plan))
+    columns["radius95_m"] = [e.ellipse95.major_m for e in track.estimates]
+    columns |= {"time": track.moments} if track.moments else {}
+    local = {"coordinates": "metres of the plan, not longitude and latitude: it has no georeference"}
+    places: list[list[float]] = [[e.x_m, e.y_m] for e in track.estimates]
+    if track.plan.georeference is not None:
+        require(str(out), "pyproj")
+        local, places = {}, track.degrees.tolist()
+    features = []
+    for place, e, row in zip(places, track.estimates, zip(*columns.values(), strict=True), strict=True):
+        finite = (None if isinstance(value, float) and not math.isfinite(value) else value for value in row)
+        features.append(_feature("Point", place if e.claims_place else None, zip(columns, finite, strict=True)))
+    for ks in track.stretches:
+        if len(ks) > 1:
+            told = {"name": track.plan.name, "t_s": [track.estimates[k].t_s for k in ks]}
+            features.append(_feature("LineString", [places[k] for k in ks], told.items()))
+    out.write_text(json.dumps({"type": "FeatureCollection", **local, "features": features}), encoding="utf-8")
+
+
+def _feature(kind: str, places: Any, told: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """A feature of GeoJSON; `places` None: one without a place."""
+    geometry = None if places is None else {"type": kind, "coordinates": places}
+    return {"type": "Feature", "geometry": geometry, "properties": dict(told)}
 
 
 def write_kml(out: Path, track: TrackOnPlan) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Tracks of recordings as files for other programs.
 
-In: a recording and a plan. Out: CSV, Parquet, GeoPackage, KML, GPX, a TUM trajectory, or a recording with newly derived messages, chosen by the
+In: a recording and a plan. Out: CSV, Parquet, GeoPackage, GeoJSON, KML, GPX, a TUM trajectory, or a recording with newly derived messages, by the
 suffix of the file name. Owns nothing.
 """
 
@@ -25,7 +25,7 @@ from echostep.tracker import Tracker
 from echostep.walk.table import columns_of, refuse_none
 from echostep_app.extras import require
 from echostep_app.output.derived import Derived
-from echostep_app.output.map_files import TrackOnPlan, flat, write_geopackage, write_gpx, write_kml
+from echostep_app.output.map_files import TrackOnPlan, flat, write_geojson, write_geopackage, write_gpx, write_kml
 from echostep_app.plan.georeference import earth_of
 from echostep_app.plan.importers.limited import open_limited
 from echostep_app.printing.console import console_for_people
@@ -128,6 +128,7 @@ FORMATS: dict[str, Write] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".gpkg": write_geopackage,
+    ".geojson": write_geojson,
     ".kml": write_kml,
     ".gpx": write_gpx,
     ".tum": _write_tum,

@@ -102,19 +102,21 @@ def _draw_walk(axes: Any, estimates: Sequence[Estimate]) -> None:
 
 def _draw_regions(axes: Any, estimates: Sequence[Estimate]) -> None:
     """The outline of the region of 95 %, where there is one; else of each place, as strong as its share of the belief."""
+    from matplotlib.collections import PatchCollection
     from matplotlib.patches import Ellipse
 
-    outline = partial(Ellipse, fill=False, linewidth=0.8, zorder=4)
+    outline, outlines = partial(Ellipse, fill=False, linewidth=0.8), []
     for e in estimates:
         major_m, minor_m, angle_rad = e.ellipse95
         colour = WORDS[e.status]
         if e.is_one_place:
             turn = math.degrees(angle_rad)
-            axes.add_patch(outline((e.x_m, e.y_m), 2 * major_m, 2 * minor_m, angle=turn, edgecolor=colour, alpha=0.6))
+            outlines.append(outline((e.x_m, e.y_m), 2 * major_m, 2 * minor_m, angle=turn, edgecolor=colour, alpha=0.6))
         for place in () if e.is_one_place else e.hypotheses:
             wide_m = 2.0 * math.sqrt(CHI2_95) * place.sd_m
             at_m, strong = (place.x_m, place.y_m), min(place.probability, 1.0)
-            axes.add_patch(outline(at_m, wide_m, wide_m, linestyle=":", edgecolor=colour, alpha=strong))
+            outlines.append(outline(at_m, wide_m, wide_m, linestyle=":", edgecolor=colour, alpha=strong))
+    axes.add_collection(PatchCollection(outlines, match_original=True, zorder=4))
 
 
 def _draw_guidance(axes: Any, level: int, route: Route | None, beacons: Sequence[BeaconPlace]) -> None:

@@ -19,10 +19,10 @@ from typing import Self
 import numpy as np
 import uvicorn
 from starlette.applications import Starlette
-from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
 
 from echostep.errors import EchostepError
 from echostep.plan import Level, Plan, load_plan, parse_plan
@@ -34,8 +34,6 @@ from echostep_app.plan.writer import plan_json
 from echostep_app.printing.lines import as_error, say, write_whole
 
 PAGE = Path(__file__).parent / "edit"
-# Files of the live page
-SHARED = "style.css", "icon.svg", "storage.js", "theme.js", "view.js", "plan.js", "language.js", "*-*.json"
 MOST_BODY = 8_000_000  # bytes of a plan: a browser draws this much smoothly
 MOST_PICTURE = 32_000_000  # bytes
 MOST_FOUND = 200  # findings of a check
@@ -99,8 +97,6 @@ class EditServer:
         self.file = PlanFile(plan)
         self._picture = None if picture is None else _picture(picture)
         self._lang = lang
-        shared = [path for name in SHARED for path in STATIC.glob(name)]
-        self._pages = {path.name: path for path in (*shared, *PAGE.iterdir())}
         self._listener = open_listener(Address(port=port))
         token = secrets.token_urlsafe(16)
         self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}/{token}/"
@@ -131,7 +127,8 @@ class EditServer:
     def _application(self, token: str) -> Starlette:
         routes = [
             Route("/", self._index),
-            Route("/static/{name}", self._static),
+            Mount("/static", StaticFiles(directory=STATIC)),
+            Mount("/edit", StaticFiles(directory=PAGE)),
             Route("/picture", self._get_picture),
             Route("/plan", self._get_plan, methods=["GET"]),
             Route("/plan", self._post_plan, methods=["POST"]),
@@ -140,13 +137,7 @@ class EditServer:
         return Starlette(routes=[Mount(f"/{token}", routes=routes)])
 
     async def _index(self, _: Request) -> Response:
-        return await page_in(self._pages["index.html"], self._lang)
-
-    async def _static(self, request: Request) -> Response:
-        path = self._pages.get(request.path_params["name"])
-        if path is None:
-            raise HTTPException(404)
-        return FileResponse(path)
+        return await page_in(PAGE / "index.html", self._lang)
 
     async def _get_picture(self, _: Request) -> Response:
         if self._picture is None:

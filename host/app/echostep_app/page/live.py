@@ -104,7 +104,9 @@ class LivePage:
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self.mailbox.publish(self._scene)
-        expected_range(0.0, 0.0, 0.0, tracker.laid_out.walls.index, self._model)  # compiled now, not at the first step
+        expected_range(
+            math.nan, 0.0, 0.0, tracker.laid_out.walls.index, self._model
+        )  # compiled now, not at the first step
 
     @property
     def url(self) -> str:
@@ -310,7 +312,7 @@ class LivePage:
         if measured is not None:
             laid_out = self._tracker.laid_out
             east_m = estimate.level * laid_out.sheet.pitch_m
-            new = last_echo_lines(measured, estimate, east_m, laid_out.walls.index, self._model)
+            new = last_echo_lines(measured, estimate, east_m, laid_out.walls, self._model)
             lines = (*(old for old in lines if old.ranger not in [line.ranger for line in new]), *new)
         return tuple(sorted((line for line in lines if estimate.t_s - line.t_s < SHOWN_S), key=attrgetter("ranger")))
 

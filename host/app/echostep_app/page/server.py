@@ -191,7 +191,8 @@ class SocketServer(Generic[S]):
         level = request.path_params["level"]
         if level >= len(self._site.plan.levels):
             raise HTTPException(404)
-        return Response(protocol.lines(self._site.plan, level), media_type="application/octet-stream")
+        rows = await asyncio.to_thread(protocol.lines, self._site.plan, level)  # exits of a large plan take a second
+        return Response(rows, media_type="application/octet-stream")
 
     async def _socket(self, websocket: WebSocket) -> None:
         await websocket.accept()

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from echostep.arrays import Bools, Floats
 from echostep.plan import Level, Plan
-from echostep_app.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces
+from echostep_app.plan.places.faces import JAMB_M, OUTSIDE, TOUCH_M, Faces, extend, faces_under, find_faces, is_walled
 from echostep_app.plan.places.findings import Lines, PlanFinding
 from echostep_app.plan.places.gaps import with_gaps
 from echostep_app.plan.places.reachability import narrowest_opening, unreachable_rooms
@@ -34,10 +34,8 @@ PARALLEL = 0.02  # sine of the angle below which walls count as parallel
 
 def check_plan(plan: Plan) -> list[PlanFinding]:
     """All findings of a plan, sorted by level and numbered from 1."""
-    needs_faces = bool(plan.connectors) or any(level.rooms for level in plan.levels)
-    passable = replace(plan, levels=tuple(with_gaps(level) for level in plan.levels)) if needs_faces else plan
-    seen = passable.levels if needs_faces else [Level(level.name, 0.0, level.walls[:0]) for level in plan.levels]
-    faces = [find_faces(level) for level in seen]
+    passable = replace(plan, levels=tuple(with_gaps(level) for level in plan.levels))
+    faces = [find_faces(level) for level in passable.levels]
     findings = [finding for i, level in enumerate(plan.levels) for finding in _level(level, i, faces[i])]
     findings += [*unreachable_rooms(passable, faces), *_connectors(passable, faces), *_start(plan)]
     findings.sort(key=lambda finding: finding.level)
@@ -110,9 +108,9 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
         if door.width_m > WIDEST_M:
             text = f"door {door.name or number} is {door.width_m:.3g} m wide: is the plan in metres?"
             yield PlanFinding("door", i, at, text, lines)
-        inner = shapely.LineString((line.interpolate(0.2, normalized=True), line.interpolate(0.8, normalized=True)))
-        if len(tree.query(inner, predicate="dwithin", distance=TOUCH_M)):
-            yield PlanFinding("door", i, at, f"a wall runs through {name}: doors are gaps in the walls", lines)
+        if is_walled(door, tree):
+            text = f"a wall runs through {name} or along it: doors are gaps in the walls"
+            yield PlanFinding("door", i, at, text, lines)
 
 
 def _distance(tree: shapely.STRtree, point: shapely.Point) -> float:

@@ -29,6 +29,8 @@ def plan_json(plan: Plan) -> str:
     tree: dict[str, Any] = {"echostep_plan": FORMAT_VERSION, "name": _text(plan.name)}
     if plan.uncertainty_m is not None:
         tree["uncertainty_m"] = plan.uncertainty_m
+    if plan.picture is not None:
+        tree["picture"] = list(plan.picture)
     if plan.georeference is not None:
         tree["georeference"] = _georeference(plan.georeference)
     tree["levels"] = [_level(level) for level in plan.levels]

@@ -34,11 +34,16 @@ def check_picture(path: Path) -> Path:
 def save_picture(figure: Figure, path: Path, *, software: str = "echostep", private: bool = True) -> None:
     """Write a figure; `private`: as a file of a run is. Raises EchostepError when it cannot be written."""
     import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     ending = check_picture(path).suffix.casefold()
     metadata = WITHOUT_DATE.get(ending, {"Software": software})
     with as_error(f"{path}: cannot write the picture"), mpl.rc_context({"svg.hashsalt": SALT}):
-        figure.savefig((claim if private else keep_earlier)(path), format=ending[1:], metadata=metadata)
+        file = (claim if private else keep_earlier)(path)
+        if ending == ".png":  # draws once; savefig draws twice
+            FigureCanvasAgg(figure).print_png(file, metadata=metadata)  # type: ignore[no-untyped-call]
+        else:
+            figure.savefig(file, format=ending[1:], metadata=metadata)
 
 
 def svg_text(figure: Figure) -> str:

@@ -129,14 +129,8 @@ class Session:
         from echostep_app.page.live import LivePage
         from echostep_app.page.web.addresses import print_page
 
-        page = LivePage(
-            self.tracker,
-            self.title,
-            address,
-            self.guided,
-            replay=self.recorded is not None,
-            keeps=self.source == "simulated",
-        )
+        replays, keeps = self.recorded is not None, self.source == "simulated"
+        page = LivePage(self.tracker, self.title, address, self.guided, replay=replays, keeps=keeps)
         print_page(console, page.server.urls)
         if self._leaves and self.recorded is None:  # past what is struck out on a page
             page.mailbox.set_goal(EXIT)
@@ -221,10 +215,7 @@ class Session:
         self._sinks.append(mark_sink(marks, page))
 
     def track(
-        self,
-        portions: Iterable[Portion],
-        progress: Callable[[], float] | None = None,
-        recorder: Recorder | None = None,
+        self, portions: Iterable[Portion], progress: Callable[[], float] | None = None, recorder: Recorder | None = None
     ) -> None:
         """Feed all portions, until Ctrl-C ends their source; the second one ends the run at once.
 

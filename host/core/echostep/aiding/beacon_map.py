@@ -61,12 +61,8 @@ class BeaconMap:
         self._walls = walls
         self._model = beacon_model(settings)
         self._rng = rng
-        self._health = initial_health(0)
-        self._waiting = no_waiting(0)
-        self._heard_s: list[float] = []
-        self._reach_m: list[float] = []  # greatest range at which each was received
-        self._unexpected_s: list[float] = []  # when each was last too far away or behind a wall
         self.heard_s: float | None = None  # when any beacon was last received
+        self._forget()
 
     def update(
         self, cloud: Cloud, segment: PathSegment, readings: Sequence[BeaconReading], plan_supports: bool = False
@@ -76,7 +72,8 @@ class BeaconMap:
         `plan_supports`: whether echoes confirm the cloud by the plan.
         """
         if not self._is_of(cloud):
-            self._begin_anew(cloud)
+            self._forget()
+            cloud.carried = ()
         length = math.hypot(segment.dx_m, segment.dy_m)
         if length > 0.0 and readings:
             propose_heading_jumps(cloud.turn_rad, cloud.log_weight, length, self._model, self._rng)
@@ -138,24 +135,21 @@ class BeaconMap:
         """Whether this cloud has placed the beacons: a search that is followed, or a cloud about a teammate, has placed none."""
         return _beliefs(cloud).mean.shape[1] == len(self._heard_s)
 
-    def _begin_anew(self, cloud: Cloud) -> None:
+    def _forget(self) -> None:
         """Forget the places, which came from a wrong cloud, and when each beacon was last received."""
         self._health, self._waiting = initial_health(0), no_waiting(0)
-        self._heard_s, self._reach_m, self._unexpected_s = [], [], []
-        cloud.carried = ()
+        self._heard_s: list[float] = []
+        self._reach_m: list[float] = []  # greatest range at which each was received
+        self._unexpected_s: list[float] = []  # when each was last too far away or behind a wall
 
     def _make_room(self, cloud: Cloud, slot: int) -> None:
         """Extend the cloud's beliefs and the lists here, so that they hold this slot."""
         known = len(self._heard_s)
         if slot < known:
             return
-        n, more = len(cloud.x_m), slot + 1 - known
-        mean, cov, doubt = _beliefs(cloud)
-        cloud.carried = (
-            np.concatenate([mean, np.zeros((n, more, 3))], axis=1),
-            np.concatenate([cov, np.zeros((n, more, 6))], axis=1),
-            np.concatenate([doubt, np.ones((n, more))], axis=1),
-        )
+        more = slot + 1 - known
+        beliefs = zip(_beliefs(cloud), empty_beliefs(len(cloud.x_m), more), strict=True)
+        cloud.carried = tuple(np.concatenate(both, axis=1) for both in beliefs)
         fresh, health = initial_health(more), self._health
         self._waiting = Waiting(*(np.concatenate(both) for both in zip(self._waiting, no_waiting(more), strict=True)))
         self._health = BeaconHealth(

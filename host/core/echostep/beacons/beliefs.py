@@ -59,8 +59,8 @@ def set_beliefs(
 
 
 @part
-def place_dropped(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
-    """Beliefs of a beacon that was just dropped: it lies about each particle (x, y), each (n,), within this variance (m2); its axis is unknown."""
+def place_beacon(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_var: float) -> None:
+    """Give each particle a belief of its own of one beacon: it lies about (x, y), each (n,), within this variance (m2); its axis is unknown."""
     for i in range(len(beliefs.mean)):
         beliefs.mean[i, slot] = x[i], y[i], 0.0
         beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, math.pi * math.pi
@@ -97,10 +97,7 @@ def correct(
 def place_covariance(beliefs: BeaconBeliefs, slot: int, weight: Floats) -> Floats:
     """Covariance (2, 2) of the place of a beacon (m2): mean of the particles' own, and scatter of their means; `weight` (n,) sums to 1."""
     cov = weight @ beliefs.cov[:, slot][:, [XX, XY, XY, YY]]
-    covariance: Floats = cov.reshape(2, 2) + np.cov(
-        beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True
-    )
-    return covariance
+    return cov.reshape(2, 2) + np.cov(beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True)
 
 
 @kernel

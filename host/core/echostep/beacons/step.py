@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, X, Y, place_dropped, set_beliefs
+from echostep.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, place_beacon
 from echostep.beacons.initialisation import locate_beacon
 from echostep.beacons.model import BeaconModel
 from echostep.beacons.slam import IN_PLACE, RECOVERIES, SUSPECT, BeaconHealth, update_by_measurement
@@ -77,7 +77,7 @@ def update_by_reading(
         elif plan_supports:
             _wait(particles, beacons, measurement)
     elif waiting.taken[k] < FIRST and measurement.range_m * measurement.range_m < 4.0 * model.drop_var_m2:
-        place_dropped(beliefs, k, particles.x_m, particles.y_m, model.drop_var_m2)
+        place_beacon(beliefs, k, particles.x_m, particles.y_m, model.drop_var_m2)
         _trust(beacons, k)
     else:
         _wait(particles, beacons, measurement)
@@ -99,10 +99,7 @@ def _wait(particles: ParticleArrays, beacons: Beacons, measurement: BeaconMeasur
         return
     fix = locate_beacon(waiting.rows[k, : min(waiting.taken[k], MOST_READINGS)])
     if fix.sure:
-        set_beliefs(beliefs, k, fix.x_m, fix.y_m, 0.0, LOCATED_SD_M**2, math.pi**2)
-        for i in range(len(particles.x_m)):
-            beliefs.mean[i, k, X] += particles.x_m[i] - x
-            beliefs.mean[i, k, Y] += particles.y_m[i] - y
+        place_beacon(beliefs, k, fix.x_m + (particles.x_m - x), fix.y_m + (particles.y_m - y), LOCATED_SD_M**2)
         _trust(beacons, k)
 
 

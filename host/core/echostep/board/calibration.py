@@ -115,13 +115,11 @@ class ImuSettings:
 
     def true_forces(self, measured: Floats) -> Floats:
         """Specific forces (n, 3) in m/s2 without the part's errors."""
-        forces: Floats = (measured - self.offset) * self.scale
-        return forces
+        return (measured - self.offset) * self.scale
 
     def true_rates(self, measured: Floats) -> Floats:
         """Rates (n, 3) in rad/s without the part's errors."""
-        rates: Floats = measured - self.bias
-        return rates
+        return measured - self.bias
 
 
 class Imus(NamedTuple):
@@ -145,9 +143,8 @@ def gyro_rates(samples: NDArray[np.void], settings: GyroSettings) -> Floats:
     """Rates (n, 3) in rad/s of thigh, calf and belt, of gyro samples (n,); NaN where a gyro is absent or in its self-test."""
     counts = np.column_stack([samples[name] for name in GYROS]).astype(np.float64)
     counts[counts == GYROS_INVALID] = np.nan
-    rates: Floats = counts * ADIS16100_RAD_S - [
-        settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
-    ]  # fmt: skip
+    biases = settings.thigh_bias_rad_s, settings.calf_bias_rad_s, settings.belt_bias_rad_s
+    rates = counts * ADIS16100_RAD_S - biases
     rates[:, BELT] *= -1.0 if settings.belt_reversed else 1.0
     return rates
 
@@ -172,8 +169,7 @@ def foot_axes(samples: NDArray[np.void]) -> tuple[Floats, Floats]:
 def compass_headings(samples: NDArray[np.void]) -> Floats:
     """Headings (n,) in radians, counter-clockwise from east, of compass samples (n,); NaN for an invalid bearing."""
     bearing = np.where(samples["bearing"] < BEARINGS, samples["bearing"], np.nan)
-    headings: Floats = 0.5 * math.pi - np.radians(0.1 * bearing)
-    return headings
+    return 0.5 * math.pi - np.radians(0.1 * bearing)
 
 
 def heights(samples: NDArray[np.void]) -> Floats:
@@ -182,5 +178,4 @@ def heights(samples: NDArray[np.void]) -> Floats:
     Only differences over a short time are meaningful, as the weather shifts all heights.
     """
     pressure_pa = np.where(samples["pressure"] == 0, np.nan, PRESSURE_PA * samples["pressure"])
-    heights_m: Floats = HEIGHT_SCALE_M * (1.0 - (pressure_pa / STANDARD_PA) ** HEIGHT_EXPONENT)
-    return heights_m
+    return HEIGHT_SCALE_M * (1.0 - (pressure_pa / STANDARD_PA) ** HEIGHT_EXPONENT)

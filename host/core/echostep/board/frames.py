@@ -113,8 +113,7 @@ class Frames:
     @property
     def is_timed(self) -> Bools:
         """Whether each body (n,) begins with ticks."""
-        timed: Bools = _SCHEMA.timed[self.id]
-        return timed
+        return _SCHEMA.timed[self.id]
 
     def rows(self, kind: type[Message]) -> tuple[Ints, NDArray[np.void]]:
         """Indices (k,) of the messages of a kind, and their bodies (k,) in the schema's dtype."""

@@ -25,7 +25,7 @@ from echostep.echoes.likelihood import (
 from echostep.jit import inline_part, kernel, lean_kernel, lean_part
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
 from echostep.particles.kernels import SegmentArrays, begin_segment, end_segment, piece_of, propagate, weight_sums
-from echostep.walls.echo_sources import list_sources, unit_at
+from echostep.walls.echo_sources import are_tabulated, list_sources, unit_at
 from echostep.walls.index import WallIndex
 from echostep.walls.source_blocks import BLOCK, DISTANCE, FREE, KIND, OFF_AXIS, new_block, set_receiver
 
@@ -60,7 +60,7 @@ def propagate_and_reweight(
     particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
     model: CloudModel, walls: WallIndex, hidden: Floats, log_evidence: Floats,
 ) -> tuple[MoveProgress, float, float]:  # fmt: skip
-    """Continue from `progress` until the cloud needs to be resampled or the move is over; `noise` (5, n) is for the rest of the move.
+    """Continue from `progress` until the cloud needs to be resampled or a table (`Walls.near`), or the move is over; `noise` (5, n) is for its rest.
 
     `hidden` (2, n): probability by ranger and particle that its view is hidden, changed in place. Writes to `log_evidence` (k,) the log of each
     ping's mean likelihood under the cloud before it. Returns the new progress, the lowest log of the share that a piece of the move left of the
@@ -82,6 +82,8 @@ def propagate_and_reweight(
                 passed += math.log(max(1.0 - crossed, wall_factor))
             done = until
         if k < len(pings.share):
+            if not are_tabulated(particles.x_m, particles.y_m, walls):
+                break
             before, of_ranger = total, hidden[pings.ranger[k]]
             reweight_by_ping(particles, arrays, of_ranger, pings, k, model.echo, top, walls, crowds, block)
             total, squares, top = weight_sums(arrays.weight)

@@ -28,6 +28,9 @@ AGREEING = 6  # stances in a row with small scatter, before the yaw is corrected
 REPEATED = 5.0  # correlation length of a disturbance, in stances
 FLOOR = 0.05  # least rms, as a share of the strength: the field bends slowly along a building
 NORTH_SD, IRON_SD = 0.5, 0.15  # initial, as shares of the strength
+NEW_FRAME_RAD2 = (
+    math.radians(10.0) ** 2
+)  # growth of the yaw's variance since the last stance: samples were missing, north is to be found again
 GAIN = 0.08  # of one stance, in the running means of `usual`
 
 # State: north (2) in the walk frame, iron (2) in the foot's axes, error of the yaw
@@ -84,10 +87,11 @@ def correction(compass: Magnetometer, nav: Nav, yaw: float) -> float:
         return 0.0
     c, s = math.cos(yaw), math.sin(yaw)
     compass.seen[MEASURED] += 1
-    if compass.seen[MEASURED] == 1:
+    growth = max(nav.P[YAW, YAW] - compass.yaw_variance[0], 0.0)
+    if compass.seen[MEASURED] == 1 or growth > NEW_FRAME_RAD2:
         _start(compass, nav, h, strength, c, s)
         return 0.0
-    compass.P[DELTA, DELTA] += max(nav.P[YAW, YAW] - compass.yaw_variance[0], 0.0)
+    compass.P[DELTA, DELTA] += growth
     compass.yaw_variance[0] = nav.P[YAW, YAW]
     if _strange(compass, h, strength):
         compass.seen[IN_A_ROW] = 0
@@ -97,8 +101,9 @@ def correction(compass: Magnetometer, nav: Nav, yaw: float) -> float:
 
 @allocating_part
 def _start(compass: Magnetometer, nav: Nav, h: Floats, strength: float, c: float, s: float) -> None:
-    """Initialise north with the first stance's field, iron with zero."""
-    compass.field[:] = 0.0
+    """Initialise north with the first stance's field in this walk frame, iron with zero."""
+    compass.field[:] = compass.P[:] = 0.0
+    compass.seen[IN_A_ROW] = 0
     compass.field[NORTH], compass.field[NORTH + 1] = c * h[0] - s * h[1], s * h[0] + c * h[1]
     for i in range(DELTA):
         compass.P[i, i] = ((NORTH_SD if i < IRON else IRON_SD) * strength) ** 2

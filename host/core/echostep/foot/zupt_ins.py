@@ -114,9 +114,9 @@ def _restart(
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
-    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, stance.UNKNOWN_YAW_RAD2)
     if s.in_stance:
         event_count = _end_stance(s, nav, compass, events, event_count)
+    nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, stance.UNKNOWN_YAW_RAD2)
     if s.levelled:
         s.yaw_rad = ins.heading(nav)
     stance.clear_rest(sums)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Height by pressure at this moment, also in a moving lift; height above the start without a plan.
+"""Height by pressure at this moment, also in a moving lift; height above the start without a plan; whether the foot is held above the floor.
 
 In: heights by pressure with the time between them, the foot's rises. Out: the height at the end of each segment. Owns two Kalman filters of two
-states: the height and its rate; the height and the lag of the height by pressure behind it, a random walk.
+states: the height and its rate; the height and the lag of the height by pressure behind it, a random walk; the last rises.
 
 The median of a segment's heights is robust, but belongs to the middle: a quarter of a second old, and 0.25 m behind in a lift at 1 m/s. A rate that
 changes slowly (a lift takes more than a second to start) carries many heights to the end: simulated rides of 3.5 m with an SCP1000 have a root mean
@@ -25,6 +25,8 @@ HEIGHT, LAG = range(2)
 MEASURED = np.array([1.0, 1.0])  # the height by pressure is their sum
 CLIMB_M_S = 0.5  # standard deviation of a climb that no foot measured, in a second: stairs at a brisk walk
 UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure: any place on earth
+# Assumed, not measured: how long a rise is kept in mind (weather, the foot's drift); sd of its difference by foot and pressure (draughts, noise)
+KEPT_S, ALIKE_M = 10.0, 0.25
 
 
 class RidingHeight:
@@ -101,3 +103,23 @@ class RelativeHeight:
             self._state += gain * (change.height_m - MEASURED @ self._state)
             self._covariance -= np.outer(gain, covariance)
             self._covariance = 0.5 * (self._covariance + self._covariance.T)
+
+
+class LiftedFoot:
+    """`evidence`: half the squared, normalized height of the foot above the floor: a foot that is lifted rises, the pressure at the belt stays."""
+
+    def __init__(self) -> None:
+        self.evidence = self._felt_m = self._risen_m = 0.0
+        self._height_m, self._starts = math.nan, 0
+
+    def update(self, change: HeightChange, barometer_starts: int) -> float:
+        """Of a segment; `barometer_starts`: how often the heights by pressure have begun. Returns by how much the evidence has grown."""
+        if math.isinf(change.height_sd_m):
+            return 0.0
+        begins = barometer_starts != self._starts or math.isnan(self._height_m)
+        risen_m, fade = (0.0, 0.0) if begins else (change.height_m - self._height_m, math.exp(-change.span_s / KEPT_S))
+        self._felt_m, self._risen_m = fade * (self._felt_m + change.felt_m), fade * (self._risen_m + risen_m)
+        self._height_m, self._starts, was = change.height_m, barometer_starts, self.evidence
+        now = 0.5 * (max(self._felt_m - max(self._risen_m, 0.0), 0.0) / ALIKE_M) ** 2
+        self.evidence = max(now, was) if now > 0.5 else now
+        return max(self.evidence - was, 0.0)

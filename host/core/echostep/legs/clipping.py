@@ -63,8 +63,7 @@ class ClippingRepair:
 
 def _at_limit(rate: Floats, limit: float | Floats) -> Bools:
     """Whether rates are at the upper limit: not below it, and not beyond it, where only a sensor with a wider range reads."""
-    at_limit: Bools = (rate >= NEAR * limit) & (rate <= BEYOND * limit)
-    return at_limit
+    return (rate >= NEAR * limit) & (rate <= BEYOND * limit)
 
 
 def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) -> None:

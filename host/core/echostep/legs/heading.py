@@ -36,8 +36,6 @@ BIN_S = 0.1  # a trunk is at rest in the middle of CALM_BINS whose mean rates di
 CALM_BINS = 7
 CALM_RAD_S = math.radians(1.0)
 
-# Fit of the compass errors; assumed, not measured.
-
 
 @dataclass(frozen=True, slots=True)
 class CompassErrors:

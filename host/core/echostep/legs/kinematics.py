@@ -149,8 +149,7 @@ def heel_rise(phase: Floats, shank: Floats, speed: float = CURVE_SPEED) -> Float
     ankle = np.interp(phase, grid, np.radians(DORSIFLEXION_DEG))
     faster = speed - CURVE_SPEED
     ankle -= PUSH_OFF_RAD * (faster if faster > 0.0 else 0.5 * faster) * np.interp(phase, PUSH_OFF_PHASES, (0.0, 1.0))
-    pitch: Floats = np.where(phase > HEEL_RISES, np.clip(-shank - ankle, 0.0, None), 0.0)
-    return pitch
+    return np.where(phase > HEEL_RISES, np.clip(-shank - ankle, 0.0, None), 0.0)
 
 
 def _about_ball(pitch: Floats, shank_m: float) -> tuple[Floats, Floats]:
@@ -164,5 +163,4 @@ def _about_heel(phase: Floats, shank: Floats, struck: float, shank_m: float) -> 
     """Forward displacement (m) of the ankle relative to the flat foot; the ankle is neutral at the strike [Perry 1992]."""
     toe_up = max(float(np.interp(struck, phase, shank)), 0.0) * np.clip(1.0 - (phase - struck) / FLAT, 0.0, 1.0)
     high, behind = ANKLE_HEIGHT * shank_m, HEEL_BEHIND * shank_m
-    forward: Floats = -high * np.sin(toe_up) - behind * (1.0 - np.cos(toe_up))
-    return forward
+    return -high * np.sin(toe_up) - behind * (1.0 - np.cos(toe_up))

@@ -165,5 +165,4 @@ def smooth(rate: Floats) -> Floats:
     """Running mean of rates (n,), with the end values repeated beyond the ends."""
     padded = np.pad(rate, SMOOTH // 2, mode="edge")
     total = np.concatenate([[0.0], np.cumsum(padded)])
-    mean: Floats = (total[SMOOTH:] - total[:-SMOOTH]) / SMOOTH
-    return mean
+    return (total[SMOOTH:] - total[:-SMOOTH]) / SMOOTH

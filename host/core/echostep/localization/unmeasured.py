@@ -13,6 +13,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from echostep.height.height_filter import LiftedFoot
+from echostep.localization.motion import height_change
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
@@ -20,15 +22,10 @@ from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
 PRIOR = 1e-4  # that it begins with the stand
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
-PAUSE_S, LONG_S = (
-    1.0,
-    5.0,
-)  # between two segments: nothing was received; of an unobserved segment: a walk out of the room
+# Between two segments: nothing was received; of an unobserved segment: a walk out of the room
+PAUSE_S, LONG_S = 1.0, 5.0
 UNOBSERVED_DOUBT = 0.2  # probability that such a way led out of the scattered cloud
-STEP_M, STEP_RAD = (
-    0.5,
-    0.9,
-)  # of a step that is no shuffle; a shorter one speaks by its share squared: a false one has 0.1 m
+STEP_M, STEP_RAD = 0.5, 0.9  # of a step that is no shuffle; a shorter one speaks by its share squared
 SILENCE_S = 1.0  # in which rangers that are not silent hear something
 SHUFFLE = 0.4  # of a step: after a longer one the rangers hear something else
 SETTLING_S = 0.5  # of a stand, in which the trunk still moves over the foot
@@ -51,6 +48,7 @@ class UnmeasuredWay:
         self._heard_s, self._is_aloft, self._step = math.inf, False, 0  # when a ranger last heard something: never
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
+        self._lifted = LiftedFoot()
 
     @property
     def has_moved(self) -> bool:
@@ -86,9 +84,10 @@ class UnmeasuredWay:
         way = math.hypot(segment.dx_m / STEP_M, segment.dy_m / STEP_M, segment.turn_rad / STEP_RAD)
         if is_step and way > SHUFFLE:
             self._look_anew(segment.t1_s)
-        ratio = ALOFT if segment.aloft and not was_aloft else 0.0
+        ratio = self._lifted.update(height_change(measured, math.nan), measured.barometer_starts)
+        ratio += ALOFT if segment.aloft and not was_aloft else 0.0
         if is_step and not segment.aloft:
-            ratio = STEPPED * (1.0 if segment.unobserved else min(way, 1.0) ** 2)
+            ratio += STEPPED * (1.0 if segment.unobserved else min(way, 1.0) ** 2) * math.exp(-self._lifted.evidence)
         return ratio + sum(
             map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
         )

@@ -126,14 +126,16 @@ class FootLegsHandover:
         return self._append_leg_segments(leg_segments)
 
     def _align_legs(self, path: LegPath, leg_segments: list[PathSegment]) -> bool:
-        """Set the legs' scale and rotation from the foot over the time that both cover; False when their lengths disagree."""
-        if not leg_segments:
-            return False
-        begin_s = max(self._kept_segments[0].t0_s, leg_segments[0].t0_s)
-        end_s = min(self._kept_segments[-1].t1_s, leg_segments[-1].t1_s)  # the legs' last stride comes later
-        foot_m = _length_m(self._kept_segments, begin_s, end_s)
-        legs_m = _length_m(leg_segments, begin_s, end_s)
-        if foot_m < MIN_OVERLAP_M or not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
+        """Set the legs' scale and rotation from the foot over the strides that both measured; False when their lengths disagree."""
+        begin_s, end_s = self._kept_segments[0].t0_s, self._kept_segments[-1].t1_s
+        # A stride that the legs did not see has no length, but a deviation
+        seen = (s for s in leg_segments if s.sd_m <= math.hypot(s.dx_m, s.dy_m))
+        spans = [(max(s.t0_s, begin_s), min(s.t1_s, end_s)) for s in seen]
+        foot_m, legs_m = (sum(_length_m(each, *at) for at in spans) for each in (self._kept_segments, leg_segments))
+        if foot_m < MIN_OVERLAP_M:
+            if self._compared_m[0] == 0.0:  # in no earlier dropout either
+                return False
+        elif not abs(legs_m / foot_m - 1.0) < MAX_LENGTH_ERROR:
             return False
         self._compared_m = (self._compared_m[0] + foot_m, self._compared_m[1] + legs_m)
         self._leg_scale = self._compared_m[0] / self._compared_m[1]

@@ -8,6 +8,7 @@ Owns nothing.
 
 from __future__ import annotations
 
+import csv
 import math
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -50,7 +51,7 @@ def separator_of(first_line: str) -> str:
 def header_of(first_line: str) -> tuple[list[str], str]:
     """Names of the columns in the first line, and the separator."""
     separator = separator_of(first_line)
-    return [name.strip().strip('"') for name in first_line.split(separator)], separator
+    return [name.strip().strip('"') for name in next(csv.reader([first_line], delimiter=separator), [""])], separator
 
 
 def column_of(header: Sequence[str], name: str) -> int:
@@ -83,6 +84,8 @@ class CsvTable:
 def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
     """Result of `read` on the file; OSError and ValueError become an EchostepError that names the file."""
     try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise ValueError("no file, but a folder, pipe or device: write the samples to a file, and give that")
         with Path(path).open("rb") as begin:
             first = begin.read(32)
         binary = "binary, not a table: export it as CSV" if b"\0" in first and first[:2] not in UTF_16 else ""
@@ -110,26 +113,20 @@ def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequ
     for number, line in enumerate(lines, start=first):
         if not line.strip():
             continue
-        cells = (line if separator == "," else line.replace(",", ".")).split(separator)
+        cells = next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
         fits = not any(map(str.strip, cells[len(names) :]))
-        row = [number_of(cells[k]) if fits and 0 <= k < len(cells) else math.nan for k in columns]
+        row = [number_of(cells[k].replace(",", ".")) if fits and 0 <= k < len(cells) else math.nan for k in columns]
         values.extend(row)
         numbers.append(number)
         bad += not all(map(math.isfinite, row[:required]))
         if len(numbers) == limits.early_rows and bad > MOST_BAD * len(numbers):
             break
-    if limits.early_rows is not None:
-        _check_share(len(numbers), bad)
-    return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
-
-
-def _check_share(rows: int, bad: int) -> None:
-    """Raise ValueError for too few rows, or too many without a number."""
-    if rows < 2:
+    if limits.early_rows is not None and len(numbers) < 2:
         raise ValueError("no samples")
-    if bad > MOST_BAD * rows:
-        share = f"{100 * bad / rows:.0f} % of the first {rows} rows"
+    if limits.early_rows is not None and bad > MOST_BAD * len(numbers):
+        share = f"{100 * bad / len(numbers):.0f} % of the first {len(numbers)} rows"
         raise ValueError(f"{share} have no number in some column, or more cells than there are names")
+    return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
 
 
 def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:

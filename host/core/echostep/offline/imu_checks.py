@@ -34,6 +34,7 @@ FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
 FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
 RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
+WRAPS_S = (2**32 * 1e-6, 2**32 * 1e-3, 2**16 * 1e-3)  # of counters in microseconds or milliseconds
 LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 BACK_SHARE = 0.02  # largest share of rows whose time goes back
 REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
@@ -58,8 +59,10 @@ LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no f
 
 
 def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows with a number in each of the first seven columns, measured anew, and notes on those left out: a sensor that repeats has stopped."""
-    whole, held = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1), np.zeros(len(table), np.bool_)
+    """The rows measured anew, with a number in each of the first seven columns (0 or -9999 on all axes is none), and notes on those left out."""
+    filled = np.ptp(table[:, FORCE], axis=1) + np.ptp(table[:, RATE], axis=1) == 0.0
+    whole = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1) & ~(filled & (filled.mean() < DEAD_SHARE))
+    held = np.zeros(len(table), np.bool_)
     for begin, end in spans((np.diff(table[:, FORCE.start : RATE.stop], axis=0) == 0.0).all(1)).tolist():
         held[begin + 1 : end + 1] = end - begin > HELD
     held &= whole & (held.mean() < DEAD_SHARE)
@@ -68,10 +71,14 @@ def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows sorted by time, with a note, if that makes the times regular. Raises ValueError for a clock that restarted."""
+    """The rows sorted by time, with a note, if that makes the times regular; counters that wrap go on. Raises ValueError for a restarted clock."""
     t_s = table[:, TIME]
+    for wrap_s in WRAPS_S:
+        steps = np.diff(t_s, prepend=t_s[:1])
+        near_s = min(LATEST * float(np.median(np.abs(steps))), 0.01 * wrap_s) if len(steps) else 0.0
+        t_s += wrap_s * np.cumsum(np.abs(steps + wrap_s) < near_s)
     back = int((np.diff(t_s) < 0.0).sum())
-    if back == 0:
+    if not back:
         return table, ()
     order = np.argsort(t_s, kind="stable")
     ahead, steps = (each[each > 0.0] for each in (np.diff(t_s), np.diff(t_s[order])))

@@ -80,13 +80,6 @@ def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tup
     return head.in_si(rows.values, wanted), (*head.notes, *left_out)
 
 
-def checked(track: Track, path: Path | str) -> Track:
-    """The track; raises EchostepError when it contradicts itself, because then the samples have other units or axes than assumed."""
-    if wrong := contradiction(track):
-        raise EchostepError(f"{path}: {wrong}")
-    return track
-
-
 def write_foot_track(path: Path | str, track: Track) -> None:
     """`t_s,x,y,z,heading_rad,stance` for every sample; raises EchostepError when the file cannot be written."""
     try:
@@ -114,8 +107,11 @@ def _describe_runs(track: Track) -> str:
 
 
 def own_track(imu: Imu, name: str) -> Track:
-    """The track by this project's method; raises EchostepError that names the recording when its samples contradict each other."""
-    return checked(aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag)), name)
+    """The track by this project's method; raises EchostepError that names the recording when it contradicts itself: other units or axes."""
+    track = aligned(walk_track(imu.t_s, imu.accel, imu.gyro, mag=imu.mag))
+    if wrong := contradiction(track):
+        raise EchostepError(f"{name}: {wrong}")
+    return track
 
 
 def describe_track(track: Track) -> str:

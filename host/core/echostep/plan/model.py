@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -28,7 +29,6 @@ from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, Pl
 FORMAT_VERSION = 1
 # Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
 MOST_PLACE_SD_M = 1.0
-WITHOUT_LENGTH = "a wall without length: both ends are the same point"
 
 
 def _no_segments() -> Floats:
@@ -160,7 +160,8 @@ class Georeference:
 class Plan:
     """A building; a notebook shows it as a picture.
 
-    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown.
+    `digest`: SHA-256 of the file. `uncertainty_m`: standard deviation of the walls' positions, None if unknown. `picture`: of the one that the
+    plan is drawn over, metres a pixel and the place of its lower left corner.
     """
 
     name: str
@@ -170,6 +171,7 @@ class Plan:
     connectors: tuple[Connector, ...] = ()
     georeference: Georeference | None = None
     uncertainty_m: float | None = None
+    picture: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -215,24 +217,33 @@ def load_plan(path: Path | str) -> Plan:
         raise EchostepError(f"{path}: cannot read the plan: {error.strerror or error}: {remedy}") from error
     try:
         return parse_plan(raw)
-    except NotJsonError as error:
-        formats = "DXF, IMDF, OSM, IFC or GeoJSON"
-        remedy = f"of another format ({formats}), echostep plan import makes one"
-        raise EchostepError(f"{path}: {error}; {remedy}") from error
     except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+        other = "; of another format (DXF, IMDF, OSM, IFC or GeoJSON), echostep plan import makes one"
+        raise EchostepError(f"{path}: {error}{other if isinstance(error, NotJsonError) else ''}") from error
 
 
 def parse_plan(raw: bytes) -> Plan:
     """Parse the bytes of a plan file; raises ValueError that names the field."""
     try:
-        tree = json.loads(raw)
+        tree = json.loads(raw, object_pairs_hook=_once)
     except (ValueError, RecursionError) as error:
         if what := replaced(raw[:32]):
             raise ValueError(what) from error
+        if isinstance(error, RecursionError) or str(error).startswith("Exceeds"):
+            raise ValueError("nested too deep, or a number has too many digits") from error
+        if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError):
+            raise
         where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
         raise NotJsonError(f"not a plan: it is not JSON{where}") from error
     return _plan(tree, hashlib.sha256(raw).hexdigest())
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose fields stand once."""
+    if len(tree := dict(pairs)) < len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"the field {short(twice)} stands twice: delete one")
+    return tree
 
 
 def _plan(tree: Any, digest: str) -> Plan:
@@ -251,6 +262,7 @@ def _plan(tree: Any, digest: str) -> Plan:
         connectors=tuple(_connector(row, f"connectors[{i}]", names) for i, row in enumerate(fields.connectors)),
         georeference=None if geo is None else Georeference(*geo.origin, math.radians(geo.rotation_deg), geo.crs),
         uncertainty_m=fields.uncertainty_m,
+        picture=fields.picture,
     )
 
 
@@ -275,8 +287,7 @@ def _room(fields: RoomFields, where: str) -> Room:
 
 
 def _door(fields: DoorFields, where: str) -> Door:
-    if fields.line[:2] == fields.line[2:]:
-        raise ValueError(f"{where}.line: {WITHOUT_LENGTH}")
+    _segments([fields.line], f"{where}.line")
     return Door(fields.line, fields.state, fields.name)
 
 
@@ -305,8 +316,6 @@ def _level_index(reference: str | int, where: str, names: list[str]) -> int:
 
 def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
     """An outline of at least three corners -> (n, 2) float64; consecutive equal corners count as one."""
-    if len(points) > plan_file.MOST_CORNERS:
-        raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
     corners = [corner for corner, _ in groupby(points)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()
@@ -320,5 +329,5 @@ def _segments(rows: Sequence[tuple[float, float, float, float]], where: str) -> 
     segments = np.array(rows, dtype=np.float64).reshape(-1, 4)
     without_length = (segments[:, :2] == segments[:, 2:]).all(axis=1)
     if without_length.any():
-        raise ValueError(f"{where}[{without_length.argmax()}]: {WITHOUT_LENGTH}")
+        raise ValueError(f"{where}[{without_length.argmax()}]: a wall without length: both ends are the same point")
     return segments

@@ -19,7 +19,7 @@ QuestionAbout = Literal["door", "wall", "room"]
 
 Reference = Annotated[Text | int, Meta(description="the name or the index of a level")]
 Point = Annotated[tuple[Metres, Metres], Meta(description="[x, y] in metres")]
-Outline = Annotated[list[Point], Meta(description="a list of corners, [x, y] in metres")]
+Outline = Annotated[list[Point], Meta(max_length=MOST_CORNERS, description="a list of corners, [x, y] in metres")]
 Segment = Annotated[tuple[Metres, Metres, Metres, Metres], Meta(description="[x0, y0, x1, y1] in metres")]
 Segments = Annotated[list[Segment], Meta(description="a list of [x0, y0, x1, y1] in metres")]
 
@@ -50,6 +50,7 @@ class QuestionFields(Struct):
     proposed: bool = False
 
 
+Pixel = Annotated[float, Meta(gt=0.0, le=LIMIT_M, description="metres a pixel, more than 0")]
 PlaceDeviation = tuple[Metres, Metres, Deviation]
 
 
@@ -105,3 +106,4 @@ class PlanFields(Struct):
     start: StartFields | None = None
     georeference: GeoreferenceFields | None = None
     uncertainty_m: Deviation | None = None
+    picture: Annotated[tuple[Pixel, Metres, Metres], Meta(description="[metres a pixel, x, y]")] | None = None

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from echostep.board.frames import BoardReader
-from echostep.board.messages import BY_ID, Message
+from echostep.board.messages import Message
 from echostep.errors import EchostepError
 from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep.recording.mcap_records import MCAP_MAGIC
@@ -29,7 +29,6 @@ LEAST_SHARE = 0.1
 READ_BYTES = 1 << 16  # of one read of the file: many frames, little memory
 HEAD_BYTES = 1 << 20  # of a port, by which the output format of legacy data is found; assumed
 BOARD_FRAME, MT_FRAME = 10, 5  # approximate bytes of a frame besides the body, to compare two readers
-MESSAGE_NAMES: dict[type, str] = {kind: kind.__name__ for kind in BY_ID.values()}
 Chunks = Iterator[tuple[str, bytes]]  # port, bytes
 
 
@@ -125,7 +124,7 @@ def as_json(message: Message | MtMessage) -> dict[str, Any]:
     """A message as a JSON object: its kind, then its fields."""
     if isinstance(message, MtMessage):
         return dict(_finite(as_object(message)))
-    return {"message": MESSAGE_NAMES[type(message)], **message._asdict()}
+    return {"message": type(message).__name__, **message._asdict()}
 
 
 def _finite(value: Any) -> Any:

@@ -41,7 +41,6 @@ class ArrivalClock(Protocol):
     bucket: Ints  # (KEPT_BUCKETS,) number of each bucket
     device_s: Floats  # (KEPT_BUCKETS,) device time of its least delayed message
     lag_s: Floats  # (KEPT_BUCKETS,) lag of that message, on the host's clock from `origin_ns`
-    begun: int  # whether there was an arrival
     origin_ns: int  # first arrival time
     offset_s: float
     drift: float
@@ -52,21 +51,10 @@ class ArrivalClock(Protocol):
     early_lag_s: float  # of the least early one
 
 
-@part
-def reset(clock: ArrivalClock) -> None:
-    """Discard all points and the line."""
-    clock.kept = 0
-    clock.begun = 0
-    clock.early = 0
-    clock.origin_ns = 0
-    clock.offset_s = clock.drift = clock.pivot_s = 0.0
-
-
 @kernel
 def update(clock: ArrivalClock, device_s: float, t_arrival_ns: int) -> None:
     """Add one arrival and fit the line again if it changes. Device seconds may be out of order."""
-    if not clock.begun:
-        clock.begun = 1
+    if not clock.kept:
         clock.origin_ns = t_arrival_ns
     lag = (t_arrival_ns - clock.origin_ns) * 1e-9 - device_s
     bucket = int(device_s // BUCKET_S)

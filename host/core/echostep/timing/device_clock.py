@@ -63,7 +63,7 @@ def new_clock(unit_s: float, modulus: int) -> Any:
     return clock
 
 
-@kernel
+@part
 def read(clock: DeviceClock, value: int, t_arrival_ns: int, restarted: bool, leads: bool) -> float:
     """Device seconds of a counter value; NaN if it is dropped (a jump, counted).
 
@@ -174,7 +174,7 @@ def _begin(clock: DeviceClock, value: int, t_arrival_ns: int, seconds: float) ->
     clock.started = 1
     clock.newest, clock.run = value, 0
     clock.epoch_s = seconds - value * clock.unit_s
-    arrival.reset(clock)
+    clock.kept = clock.early = 0  # all points and the line are discarded
     arrival.update(clock, seconds, t_arrival_ns)
     return seconds
 

@@ -16,14 +16,14 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import allocating_part, inline_kernel, kernel, lean_kernel, part
+from echostep.jit import inline_kernel, kernel, lean_kernel, part
 from echostep.walls.index import BEARINGS, EAR_REACH_M, JOIN_M, TILE_M, SourceTable, WallIndex, build_index, tile_at
 from echostep.walls.source_blocks import Limits, list_of_unit, one_receiver, set_receiver
 from echostep.walls.tile_faces import tile_faces
 from echostep.walls.tile_geometry import SLACK_M
 from echostep.walls.tile_points import tile_points
 
-__all__ = ["Walls", "echo_sources", "list_sources", "one_receiver", "unit_at"]
+__all__ = ["Walls", "are_tabulated", "echo_sources", "list_sources", "one_receiver", "unit_at"]
 FARTHEST_M = 3.0  # greatest `reach_m`: it bounds the tiles made at once
 
 
@@ -184,29 +184,32 @@ def list_sources(count: int, unit: int, index: WallIndex, limits: Limits, block:
     `limits`: sources farther than a wall within the first (m), whose foot is off the axis by at most the second (a cosine), are left out, and edges
     farther than the third (m).
     WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
-    place where a wall ends or walls turn. Returns the length of the longest list.
+    place where a wall ends or walls turn. Returns the length of the longest list. Raises LookupError where `Walls.near` has not been.
     """
     if unit < 0:
         return 0
     tile, bearing = unit // BEARINGS, unit % BEARINGS
     k = index.tile_number[tile] - 1
-    if 0 <= k < index.tabulated:
-        return list_of_unit(count, k * BEARINGS + bearing, index.walls, index.faces, index.points, limits, block)
-    return _list_in_missing_tile(count, tile, bearing, index, limits, block)
+    if not 0 <= k < index.tabulated:
+        raise LookupError("the tile has no table: Walls.near makes it")
+    return list_of_unit(count, k * BEARINGS + bearing, index.walls, index.faces, index.points, limits, block)
 
 
-@allocating_part
-def _list_in_missing_tile(count: int, tile: int, bearing: int, index: WallIndex, limits: Limits, block: Floats) -> int:
-    """The same in a tile that is not tabulated: its tables are made for this call alone."""
-    faces, points = tile_sources(tile, index, 0.0)
-    return list_of_unit(count, bearing, index.walls, faces, points, limits, block)
+@lean_kernel
+def are_tabulated(x: Floats, y: Floats, index: WallIndex) -> bool:
+    """Whether sources can be asked for at all of these places (n,)."""
+    for i in range(len(x)):
+        tile = tile_at(x[i], y[i], index)
+        if tile >= 0 and not 0 < index.tile_number[tile] <= index.tabulated:
+            return False
+    return True
 
 
 @lean_kernel
 def echo_sources(px: float, py: float, axis_rad: float, index: WallIndex, block: Floats) -> int:
     """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
 
-    They are in the lists of the block's first receiver [`one_receiver`].
+    They are in the lists of the block's first receiver [`one_receiver`]. Raises LookupError like `list_sources`.
     """
     set_receiver(block, 0, px, py, math.cos(axis_rad), math.sin(axis_rad))
     return list_sources(1, unit_at(px, py, axis_rad, index), index, (0.0, 1.0, EAR_REACH_M), block)

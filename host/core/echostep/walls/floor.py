@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.arrays import Bools, Floats, Ints
-from echostep.jit import kernel, part
+from echostep.arrays import Bools, Floats, Octets
+from echostep.jit import inline_part, kernel
 
 # Assumed, not measured.
 CELL_M = 0.25  # side of a cell
@@ -66,51 +66,55 @@ def walkable_floor(walls: Floats) -> Floor:
     if columns * rows > MOST_CELLS:
         return NO_FLOOR
     cells = (walls - np.tile(low, 2)) / CELL_M
-    blocked, hall = np.zeros((2, rows, columns), np.bool_)
+    blocked = np.zeros((rows, columns), np.bool_)
     mark_near_walls(cells, BODY_M / CELL_M, blocked)
-    mark_near_walls(cells, HALL_M / CELL_M, hall)
-    in_sight = _walls_in_sight(blocked, int(SIGHT_M / CELL_M))
+    in_sight = _walls_in_sight(blocked.view(np.uint8), int(SIGHT_M / CELL_M))
     inside = in_sight >= INSIDE * DIRECTIONS
     if not inside.any():
-        inside = hall & ~blocked
+        mark_near_walls(cells, HALL_M / CELL_M, inside)
+        inside &= ~blocked
     row, column = np.nonzero(inside)
     enclosed = in_sight[row, column] >= ENCLOSED * DIRECTIONS
     return Floor(low[0] + (column + 0.5) * CELL_M, low[1] + (row + 0.5) * CELL_M, enclosed)
 
 
 @kernel
-def _walls_in_sight(blocked: Bools, sight: int) -> Ints:
-    """For each cell, in how many directions a blocked cell is met within `sight` cells; 0 for blocked cells."""
+def _walls_in_sight(blocked: Octets, sight: int) -> Octets:
+    """For each cell, in how many directions a blocked cell is met within `sight` cells; 0 for blocked cells.
+
+    A whole row looks one step further at a time, for bytes beside one another are worked on at once.
+    """
     rows, columns = blocked.shape
-    in_sight = np.zeros((rows, columns), np.int64)
+    in_sight = np.zeros((rows, columns), np.uint8)
+    has_walls = np.array([blocked[r].any() for r in range(rows)])
+    for k in range(DIRECTIONS):
+        dx, dy = math.cos(2.0 * math.pi * k / DIRECTIONS), math.sin(2.0 * math.pi * k / DIRECTIONS)
+        for r in range(rows):
+            met = np.zeros(columns, np.uint8)
+            for step in range(1, sight):
+                y, aside = int(r + 0.5 + step * dy), math.floor(0.5 + step * dx)
+                if not (0 <= y < rows and abs(aside) < columns):
+                    break
+                if has_walls[y]:
+                    _meet(met[max(-aside, 0) :], blocked[y, max(aside, 0) :])
+            for c in range(columns):
+                in_sight[r, c] += met[c]
     # Columns to the nearest one with a wall: others are between two levels of the sheet
-    aside = np.full(columns, sight, np.int64)
+    near = np.zeros(columns, np.uint8)
     for c in range(columns):
         if blocked[:, c].any():
-            for k in range(max(c - sight, 0), min(c + sight, columns)):
-                aside[k] = min(aside[k], abs(k - c))
+            near[max(c - sight // 4 + 1, 0) : c + sight // 4] = 1
     for r in range(rows):
         for c in range(columns):
-            if not blocked[r, c] and aside[c] < sight // 4:
-                in_sight[r, c] = _directions_met(r, c, blocked, sight)
+            in_sight[r, c] *= near[c] * (1 - blocked[r, c])
     return in_sight
 
 
-@part
-def _directions_met(r: int, c: int, blocked: Bools, sight: int) -> int:
-    """In how many directions a blocked cell is met."""
-    rows, columns = blocked.shape
-    met = 0
-    for k in range(DIRECTIONS):
-        dx, dy = math.cos(2.0 * math.pi * k / DIRECTIONS), math.sin(2.0 * math.pi * k / DIRECTIONS)
-        for step in range(1, sight):
-            y, x = int(r + 0.5 + step * dy), int(c + 0.5 + step * dx)
-            if not (0 <= y < rows and 0 <= x < columns):
-                break
-            if blocked[y, x]:
-                met += 1
-                break
-    return met
+@inline_part
+def _meet(met: Octets, seen: Octets) -> None:
+    """Mark what is blocked in `seen`, as far as both reach."""
+    for c in range(min(len(met), len(seen))):
+        met[c] |= seen[c]
 
 
 @kernel
@@ -158,7 +162,7 @@ def inside_grid(x_m: Floats, y_m: Floats) -> Indoors:
     west_m, south_m = (float(v.min()) - (margin + 0.5) * CELL_M for v in (x_m, y_m))
     column, row = (np.rint((v - low) / CELL_M - 0.5).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))
     inside = np.zeros((int(row.max()) + margin + 1, int(column.max()) + margin + 1), np.bool_)
-    for down in range(-WALL_CELLS, WALL_CELLS + 1):
-        for along in range(-WALL_CELLS, WALL_CELLS + 1):
-            inside[row + down, column + along] = True
+    inside[row, column] = True
+    for axis in (0, 1):  # the margin holds what goes round
+        inside = np.logical_or.reduce([np.roll(inside, by, axis) for by in range(-WALL_CELLS, WALL_CELLS + 1)])
     return Indoors(west_m, south_m, inside)

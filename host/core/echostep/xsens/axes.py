@@ -44,6 +44,13 @@ def product(p: Floats, q: Floats) -> Floats:
     )
 
 
+def from_values(orientation: Floats) -> Floats:
+    """Quaternions (n, 4) of orientations as an MT sends them: quaternions (n, 4), Euler angles (n, 3) or matrices (n, 9)."""
+    if orientation.shape[1] == 4:
+        return orientation
+    return from_euler(orientation) if orientation.shape[1] == 3 else from_matrix(orientation)
+
+
 def from_euler(degrees: Floats) -> Floats:
     """Quaternions of roll, pitch, yaw (n, 3) in degrees, R = Rz(yaw) Ry(pitch) Rx(roll) [Manual 2.3, aerospace sequence].
 

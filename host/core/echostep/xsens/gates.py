@@ -16,6 +16,9 @@ from echostep.xsens.mtdata import ACCEL, ATTITUDE, COLUMNS, GYRO, MAG
 
 # Results of the gates, in the order of the gates; also entries of the tally. LOST is an entry only.
 GOOD, OTHER_DEVICE, INCOMPLETE, NOT_FINITE, BAD_QUATERNION, OUT_OF_RANGE, REPEATED, BAD_COUNTER, LOST = range(9)
+TALLIED = (  # the same in `MtxCounts`
+    "good", "other_device", "incomplete", "not_finite", "bad_quaternion", "out_of_range", "repeated", "bad_counter", "lost",
+)  # fmt: skip
 
 # Samples; after a larger jump of the counter the sample waits until the next counter confirms it; assumed
 MAX_GAP = 500

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.xsens.axes import ENU, NED, NWU, from_euler, from_matrix
+from echostep.xsens.axes import ENU, NED, NWU, from_values
 from echostep.xsens.frames import BUS_ID, CONFIGURATION, LONGEST, MTDATA, MTDATA2, Frame, FrameReader, MtFrameCounts
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata, rest_of
 from echostep.xsens.output_formats import OutputFormats, configured_devices
@@ -129,10 +128,10 @@ class MessageReader:
         return MtMessage(
             "MtSample" if sent.any() else "MTData", frame.mid, frame.bus,
             int(counter[0]) if counter[0] >= 0 else None,
-            _vector(row[ACCEL]) if accel else None,
-            _vector(row[GYRO]) if gyro else None,
-            _vector(row[MAG]) if mag else None,
-            _quaternion(row[ATTITUDE]) if oriented else None,
+            tuple(row[ACCEL].tolist()) if accel else None,
+            tuple(row[GYRO].tolist()) if gyro else None,
+            tuple(row[MAG].tolist()) if mag else None,
+            tuple(row[ATTITUDE].tolist()) if oriented else None,
             NWU if oriented else None,
             None if np.isnan(row[CELSIUS]) else float(row[CELSIUS]),
             tuple({"name": name, "value": value} for name, value in rest_of(frame.payload, output).items()),
@@ -156,7 +155,7 @@ def _from_packets(frame: Frame) -> MtMessage:
         elif values and name == "Temperature" and "celsius" not in fields:
             fields["celsius"] = values[0]
         elif values and name in _ORIENTATIONS and packet.world in WORLDS and "quaternion" not in fields:
-            fields["quaternion"], fields["world"] = _orientation(name, values), packet.world
+            fields["quaternion"], fields["world"] = tuple(from_values(np.array([values]))[0].tolist()), packet.world
             others += [] if name == "Quaternion" else [_as_object(packet)]
         else:
             others.append(_as_object(packet))
@@ -177,34 +176,10 @@ def _as_object(packet: Packet) -> dict[str, object]:
     return {**known, **packet.fields}
 
 
-def _orientation(name: str, values: tuple[float, ...]) -> Quaternion:
-    """The quaternion of an orientation packet; one that is no rotation gives 0."""
-    if name == "Quaternion":
-        return _quaternion(np.array(values))
-    row = np.array([values])
-    return _quaternion((from_matrix(row) if name == "RotationMatrix" else from_euler(row))[0])
-
-
-def _vector(row: Floats) -> Vector:
-    x, y, z = row.tolist()
-    return x, y, z
-
-
-def _quaternion(row: Floats) -> Quaternion:
-    w, x, y, z = row.tolist()
-    return w, x, y, z
-
-
 def as_object(message: MtMessage) -> dict[str, object]:
     """The message as JSON: its sent fields, the bus unless the device is alone, bytes as hex."""
-    sent = {
-        "counter": message.counter,
-        "accel": message.accel,
-        "gyro": message.gyro,
-        "mag": message.mag,
-        "quaternion": message.quaternion,
-    }
-    known: dict[str, object] = {name: value for name, value in sent.items() if value is not None}
+    names = ("counter", "accel", "gyro", "mag", "quaternion")
+    known = {name: value for name in names if (value := getattr(message, name)) is not None}
     if message.world is not None:
         known["world"] = WORLDS[message.world]
     if message.celsius is not None:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, Octets
-from echostep.xsens.axes import from_euler, from_matrix
+from echostep.xsens.axes import from_values
 from echostep.xsens.sample import MtSample
 
 # Output mode [Manual 5.3.3, SetOutputMode; status: CMT].
@@ -138,7 +138,7 @@ def decode_mtdata(rows: Octets, output: OutputFormat) -> Decoded:
         values[:, columns] = numbers[:, first : first + 3]
         first += 3
     if output.orientation_values:
-        values[:, ATTITUDE] = _quaternions(numbers[:, first:])
+        values[:, ATTITUDE] = from_values(numbers[:, first:])
     return Decoded(values, counter, sent)
 
 
@@ -157,13 +157,6 @@ def rest_of(payload: bytes, output: OutputFormat) -> dict[str, list[int] | int]:
     if output.mode & STATUS:
         fields["status"] = payload[begin + 2 * output.analog_inputs]
     return fields
-
-
-def _quaternions(orientation: Floats) -> Floats:
-    """Quaternions (n, 4) of orientations (n, 4), (n, 3) or (n, 9)."""
-    if orientation.shape[1] == 4:
-        return orientation
-    return from_euler(orientation) if orientation.shape[1] == 3 else from_matrix(orientation)
 
 
 def pack_mtdata(sample: MtSample) -> bytes:

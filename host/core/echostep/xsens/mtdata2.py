@@ -14,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, Octets
 from echostep.jit import kernel
-from echostep.xsens.axes import from_euler, from_matrix, to_mt_world
+from echostep.xsens.axes import from_values, to_mt_world
 from echostep.xsens.frames import copy_payloads
 from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, COLUMNS, GYRO, MAG, Decoded
 
@@ -40,13 +40,6 @@ class PacketIndex(NamedTuple):
     whole: Bools
 
 
-class _Quantities(NamedTuple):
-    """Identifier without its low bits (8,), and number of values (8,), of each quantity."""
-
-    kind: Ints
-    values: Ints
-
-
 def find_packets(stream: Octets, body: Ints, length: Ints) -> PacketIndex:
     """Index of the quantities of a sample in payloads that begin at `body` (n,) and have `length` (n,) bytes."""
     packets = PacketIndex(
@@ -54,12 +47,12 @@ def find_packets(stream: Octets, body: Ints, length: Ints) -> PacketIndex:
         np.zeros((len(body), len(_TYPES)), np.int64),
         np.zeros(len(body), np.bool_),
     )
-    _fill_index(stream, body, length, _Quantities(_TYPES, _VALUES), packets)
+    _fill_index(stream, body, length, packets)
     return packets
 
 
 @kernel
-def _fill_index(stream: Octets, body: Ints, length: Ints, quantities: _Quantities, packets: PacketIndex) -> None:
+def _fill_index(stream: Octets, body: Ints, length: Ints, packets: PacketIndex) -> None:
     """Fill `packets` from the packets of each frame; a frame with a wrong size or world has no quantity."""
     for k in range(len(body)):
         begin, end = body[k], body[k] + length[k]
@@ -68,12 +61,12 @@ def _fill_index(stream: Octets, body: Ints, length: Ints, quantities: _Quantitie
             identifier = (np.int64(stream[begin]) << 8) | np.int64(stream[begin + 1])
             size = np.int64(stream[begin + 2])
             begin += 3
-            for j in range(len(quantities.kind)):
-                if identifier & TYPE_MASK == quantities.kind[j]:
+            for j in range(len(_TYPES)):
+                if identifier & TYPE_MASK == _TYPES[j]:
                     form = identifier & FORMAT_MASK
                     width = 2 if j == _COUNTER else (4 if form < FP1632 else 2 + 2 * form)
                     known_world = identifier & WORLD_MASK != WORLD_MASK  # there is no fourth world
-                    fits = fits and size == width * quantities.values[j] and known_world
+                    fits = fits and size == width * _VALUES[j] and known_world
                     packets.begin[k, j], packets.bits[k, j] = begin, identifier & (WORLD_MASK | FORMAT_MASK)
             begin += size
         packets.whole[k] = fits and begin == end
@@ -102,16 +95,9 @@ def decode_mtdata2(stream: Octets, packets: PacketIndex) -> Decoded:
             if quantity in _COLUMNS:
                 values[which, _COLUMNS[quantity]] = numbers
             else:
-                values[which, ATTITUDE] = to_mt_world(_quaternions(quantity, numbers), low & WORLD_MASK)
+                values[which, ATTITUDE] = to_mt_world(from_values(numbers), low & WORLD_MASK)
     oriented = (packets.begin[:, _QUATERNION : _EULER + 1] > 0).any(axis=1)
     return Decoded(values, counter, np.column_stack([packets.begin[:, _ACCEL:] > 0, oriented]))
-
-
-def _quaternions(quantity: int, numbers: Floats) -> Floats:
-    """Quaternions (n, 4) of orientations as `quantity` sends them."""
-    if quantity == _QUATERNION:
-        return numbers
-    return from_matrix(numbers) if quantity == _MATRIX else from_euler(numbers)
 
 
 def read_numbers(rows: Octets, form: int) -> Floats:

@@ -127,28 +127,17 @@ def _known(mode: int, settings: int) -> OutputFormat | None:
 @cache
 def _formats(length: int) -> tuple[OutputFormat, ...]:
     """All formats whose payloads have this length, the simplest first: with fewer bits set; floats before fixed point, raw data last."""
-    absent = (
-        0,
-        mt.NO_MAG,
-        mt.NO_ACCEL,
-        mt.NO_GYRO,
-        mt.NO_ACCEL | mt.NO_MAG,
-        mt.NO_GYRO | mt.NO_MAG,
-        mt.NO_ACCEL | mt.NO_GYRO,
-    )
     modes = [
-        sum(bits)
-        for bits in product(
-            (0, mt.CALIBRATED), (0, mt.ORIENTATION), (0, mt.TEMPERATURE), (0, mt.STATUS), (0, mt.AUXILIARY)
-        )
-        if bits[0] or bits[1]  # with neither, the values show nothing
+        mode
+        for mode in _sums(mt.CALIBRATED, mt.ORIENTATION, mt.TEMPERATURE, mt.STATUS, mt.AUXILIARY)
+        if mode & (mt.CALIBRATED | mt.ORIENTATION)  # with neither, the values show nothing
     ]
     choices = product(
         modes,
         (mt.FLOAT, mt.FIXED_12_20),
         (mt.SAMPLE_COUNTER, 0),
         (mt.QUATERNION, mt.EULER, mt.MATRIX),
-        absent,
+        _sums(mt.NO_ACCEL, mt.NO_GYRO, mt.NO_MAG)[:-1],  # not all three
         (0, mt.NO_ANALOG_1, mt.NO_ANALOG_2),
     )
     formats = set()
@@ -158,6 +147,11 @@ def _formats(length: int) -> tuple[OutputFormat, ...]:
     formats |= {OutputFormat(mt.RAW, counter) for counter in (mt.SAMPLE_COUNTER, 0)}
     fits = [output for output in formats if output.length == length]
     return tuple(sorted(fits, key=_complexity))
+
+
+def _sums(*bits: int) -> list[int]:
+    """The sum of each choice of some of these bits, of none first and of all last."""
+    return [sum(chosen) for chosen in product(*((0, bit) for bit in bits))]
 
 
 def _complexity(output: OutputFormat) -> tuple[int, ...]:

@@ -10,7 +10,9 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from echostep.xsens.mtdata2 import FLOAT32, FLOAT64, FORMAT_MASK, FP1220, TYPE_MASK, WIDTHS, WORLD_MASK
+import numpy as np
+
+from echostep.xsens.mtdata2 import FORMAT_MASK, TYPE_MASK, WIDTHS, WORLD_MASK, read_numbers
 
 NUMBERS = {  # packets in one of the four number formats: name, fields
     0x0810: ("Temperature", ("",)),
@@ -102,7 +104,8 @@ def _decode(identifier: int, content: bytes) -> Packet:
     if kind in NUMBERS:
         name, names = NUMBERS[kind]
         if len(content) == len(names) * WIDTHS[form]:
-            fields = dict(zip(names, _numbers(content, form), strict=True))
+            numbers = read_numbers(np.frombuffer(content, np.uint8)[None], form)
+            fields = dict(zip(names, numbers[0].tolist(), strict=True))
     elif kind in INTEGERS:
         name, layout, names = INTEGERS[kind]
         if len(content) == struct.calcsize(layout):
@@ -110,17 +113,6 @@ def _decode(identifier: int, content: bytes) -> Packet:
     elif kind == SATELLITES:
         name, fields = "GNSSSatInfo", _satellites(content)
     return Packet(identifier, name, form, world, fields, content)
-
-
-def _numbers(content: bytes, form: int) -> list[float]:
-    """Numbers in float32, 12.20, 16.32 (fraction first) or double [LLCP, output formats]."""
-    count = len(content) // WIDTHS[form]
-    if form in (FLOAT32, FLOAT64):
-        return list(struct.unpack(f">{count}{'f' if form == FLOAT32 else 'd'}", content))
-    if form == FP1220:
-        return [number * 2.0**-20 for number in struct.unpack(f">{count}i", content)]
-    parts = struct.unpack(">" + "Ih" * count, content)
-    return [whole + fraction * 2.0**-32 for fraction, whole in zip(parts[::2], parts[1::2], strict=True)]
 
 
 def _satellites(content: bytes) -> dict[str, float]:

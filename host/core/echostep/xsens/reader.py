@@ -121,23 +121,14 @@ class MtxReader:
     @property
     def counts(self) -> MtxCounts:
         """Counts since the start."""
-        tally = self._tally.tolist()
         return MtxCounts(
-            good=tally[gates.GOOD],
-            other_device=tally[gates.OTHER_DEVICE],
             skipped_bytes=self._frames.counts.skipped_bytes,
             bad_checksum=self._frames.counts.bad_checksum,
             bad_length=self._bad_length,
-            incomplete=tally[gates.INCOMPLETE],
-            bad_quaternion=tally[gates.BAD_QUATERNION],
-            not_finite=tally[gates.NOT_FINITE],
-            out_of_range=tally[gates.OUT_OF_RANGE],
-            repeated=tally[gates.REPEATED],
-            bad_counter=tally[gates.BAD_COUNTER],
             other_messages=self._other,
             wake_ups=self._wake_ups,
             device_errors=self._errors,
-            lost=tally[gates.LOST],
+            **dict(zip(gates.TALLIED, self._tally.tolist(), strict=True)),
         )
 
     @property
@@ -181,7 +172,7 @@ class MtxReader:
         alike = index - np.maximum.accumulate(np.where(changed, index, -1 - self._alike))
         if len(index):
             self._last, self._alike = measured[-1:], int(alike[-1])
-        fresh: Bools = alike < HELD
+        fresh = alike < HELD
         held = int((~fresh).sum())
         self._tally[[gates.GOOD, gates.REPEATED]] += (-held, held)
         return fresh

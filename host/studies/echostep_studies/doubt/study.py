@@ -36,14 +36,14 @@ BEFORE_M, WITHIN_M = 25.0, 18.0  # way before the span, and in it
 PAUSE_S = 4.0  # at its begin and end
 STANDING_S = 60.0  # of the kinds that stand
 PORTION_NS = 100_000_000  # the tracker gets what has arrived in this time at once
-AGE_S = 2.0  # an older estimate claims the place where the trunk is now
+AGE_S = 2.0  # an older estimate is shown as one without measurements since
 COLUMNS = {
     "name": "", "runs": "runs", "tracking": "says tracking %", "lost": "says lost %", "false": "false tracking %",
     "false_s": "longest s", "worst_m": "worst m", "end_m": "end m", "end_tracking": "ends tracking %",
 }  # fmt: skip
 NOTES = (
     "false tracking: share of the time with tracking and more than 1 m of error; longest: in a row, of all walks; worst: error while tracking.",
-    f"An estimate older than {AGE_S:g} s is held against where the trunk is now. Times are those after the span began.",
+    f"An estimate older than {AGE_S:g} s has grown at a walker's speed since, as on the pages. Times are those after the span began.",
 )
 
 
@@ -134,15 +134,15 @@ def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[tuple[float, Est
     shown: list[tuple[float, Estimate]] = []
     for _, together in groupby(chunks, lambda chunk: chunk.t_arrival_ns // PORTION_NS):
         portion = list(together)
+        at_s = 1e-9 * (portion[-1].t_arrival_ns - START_NS)
         newest = tracker.take(portion_of(portion))[-1:] or [estimate for _, estimate in shown[-1:]]
-        shown += [(1e-9 * (portion[-1].t_arrival_ns - START_NS), estimate) for estimate in newest]
+        shown += [(at_s, e if at_s - e.t_s < AGE_S else e.unobserved(at_s)) for e in newest]
     return shown
 
 
 def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth: Floats, from_s: float) -> DoubtRow:
     later = [(t, e) for t, e in shown if t >= from_s]
-    at_s = np.array([e.t_s if t - e.t_s < AGE_S else t for t, e in later])
-    true = at_times(at_s, truth[:, T], truth[:, [X, Y]])
+    true = at_times(np.array([e.t_s for _, e in later]), truth[:, T], truth[:, [X, Y]])
     off_m = np.hypot(*(np.array([(e.x_m, e.y_m) for _, e in later]) - true).T)
     sure = np.array([e.status is TrackStatus.TRACKING for _, e in later])
     false, span_s = sure & (off_m > FALSE_TRACKING_M), np.diff([from_s, *(t for t, _ in later)])

@@ -53,11 +53,8 @@ def write_files(out: Path, walk: Hallway, seed: int) -> None:
     """Write plan.json, truth.csv, settings.toml and walk.mcap."""
     out.mkdir(parents=True, exist_ok=True)
     first = walk.print_m[1] - walk.print_m[0]
-    start = {
-        "x": walk.print_m[0, 0],
-        "y": walk.print_m[0, 1],
-        "heading_deg": math.degrees(math.atan2(first[1], first[0])),
-    }
+    (x, y), heading_deg = walk.print_m[0].tolist(), math.degrees(math.atan2(first[1], first[0]))
+    start = {"x": x, "y": y, "heading_deg": heading_deg}
     level = {"name": "corridor", "height_m": 0.0, "walls": np.round(walk.walls, 3).tolist()}
     plan = {"echostep_plan": 1, "name": f"Corridor drawn around {NAME}", "levels": [level], "start": start}
     (out / "plan.json").write_text(json.dumps(plan, indent=1) + "\n")
@@ -67,14 +64,8 @@ def write_files(out: Path, walk: Hallway, seed: int) -> None:
     loaded = load_plan(out / "plan.json")
     assert loaded.start is not None
     pose = f"{loaded.start.x_m!r},{loaded.start.y_m!r},{loaded.start.heading_rad!r}"
-    about = {
-        "note": NOTE,
-        "start_x_y_rad": pose,
-        "seed": str(seed),
-        "settings_toml": SETTINGS,
-        "plan_sha256": loaded.digest,
-    }
-    with start_recording(out / "walk.mcap", about) as recorder:
+    about = {"note": NOTE, "start_x_y_rad": pose, "seed": str(seed), "settings_toml": SETTINGS}
+    with start_recording(out / "walk.mcap", about | {"plan_sha256": loaded.digest}) as recorder:
         for chunk in chunks(walk, loaded, seed):
             recorder.write(chunk)
 

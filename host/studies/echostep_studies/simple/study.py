@@ -32,11 +32,12 @@ OFF = {"/off": "", "/turned": "", "/off-foot": "/foot-alone"}
 NAMES = tuple(f"{building}{fault}" for building in BUILDINGS for fault in (*FAULTS, *OFF, LEGS))
 COLUMNS = {
     "name": "", "runs": "runs", "tracking": "says tracking %", "lost": "says lost %", "false_tracking": "false tracking %", "mean_m": "mean m",
-    "rmse_m": "RMSE m", "worst_m": "worst m", "laid_m": "path laid on the plan m",
+    "rmse_m": "RMSE m", "worst_m": "worst m", "in_ellipse": "in ellipse %", "laid_m": "path laid on the plan m",
 }  # fmt: skip
 NOTES = (
     "From the true place and heading, with the default start: 0.15 m, 5 degrees; off: by as much; turned: by 20. Shares are of all estimates.",
     "false tracking: off by more than 1 m. path laid on the plan: RMSE of the measured path from that start, without a filter.",
+    "in ellipse: of the tracking claims, those whose 95 % ellipse holds the true place.",
 )
 
 
@@ -52,6 +53,8 @@ class SimpleRow:
     mean_m: float
     rmse_m: float
     worst_m: float
+    ellipses: int
+    in_ellipse: int
     laid_m: float
 
 
@@ -86,7 +89,8 @@ def _row(name: str, seed: int, walk: SimulatedWalk) -> SimpleRow:
     return SimpleRow(
         name=name, seed=seed, tracking=float((judged.status == TRACKING).mean()), lost=float((judged.status == LOST).mean()),
         false_tracking=float(judged.false_tracking.mean()), mean_m=float(off.mean()), rmse_m=float(np.sqrt((off**2).mean())),
-        worst_m=float(off.max()), laid_m=float(np.sqrt(((_laid(walk, start) - true) ** 2).sum(1).mean())),
+        worst_m=float(off.max()), ellipses=len(judged.in_ellipse), in_ellipse=int(judged.in_ellipse.sum()),
+        laid_m=float(np.sqrt(((_laid(walk, start) - true) ** 2).sum(1).mean())),
     )  # fmt: skip
 
 
@@ -103,10 +107,12 @@ def _summary(rows: Sequence[SimpleRow]) -> Row:
     def mean(name: str, power: float = 1.0) -> float:
         return round(float(np.mean([getattr(row, name) ** power for row in rows]) ** (1.0 / power)), 5)
 
+    ellipses = sum(row.ellipses for row in rows)
     return {
         **named(rows), "tracking": 100.0 * mean("tracking"), "lost": 100.0 * mean("lost"),
         "false_tracking": 100.0 * mean("false_tracking"), "mean_m": mean("mean_m"), "rmse_m": mean("rmse_m", 2.0),
         "worst_m": max(row.worst_m for row in rows), "laid_m": mean("laid_m", 2.0),
+        "in_ellipse": 100.0 * sum(row.in_ellipse for row in rows) / ellipses if ellipses else None,
     }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from board_runs import ROOT
 from echostep.plan import load_plan
 from echostep_app.page.editor import EditServer
-from page.browser import loaded_page, spot, wait_for
+from page.browser import loaded_page, spot
 from waiting import until
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
@@ -44,12 +44,14 @@ def saved(page: Any, server: EditServer) -> Any:
     return load_plan(server.file.path).levels[0]
 
 
-def answer(page: Any, text: str) -> None:
-    """Type the answer to the question in the dialog, and wait until the sheet has it."""
-    page.locator("#ask[open]").wait_for()
-    page.fill("#answer", text)
-    page.press("#answer", "Enter")
-    wait_for(page, "!echostep.isOpen()")  # the answer has arrived: a dialog closes before it gives it
+def answers(page: Any, text: str, proposed: str = "") -> None:
+    """The next question of the page, which proposes a text, is answered so."""
+
+    def answer(dialog: Any) -> None:
+        assert dialog.default_value == proposed
+        dialog.accept(text)
+
+    page.once("dialog", answer)
 
 
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float], button: str = "left") -> None:
@@ -65,5 +67,5 @@ def status(page: Any) -> str:
 
 
 def says(page: Any, words: str) -> None:
-    """The page comes to say this: an answer in a dialog arrives after the click."""
+    """The page comes to say this."""
     assert until(lambda: status(page) == words), f"{status(page)!r}, not {words!r}"

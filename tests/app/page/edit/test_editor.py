@@ -42,8 +42,8 @@ def test_the_page_the_plan_and_nothing_else(served: EditServer) -> None:
     assert (status, raw.decode()) == (200, plan_json(load_plan(DEMO)))
     assert "default-src 'none'" in headers["content-security-policy"]
     assert asked(served, "picture")[0] == 204
-    assert asked(served, "static/geometry.js")[2]["content-type"].startswith("text/javascript")
-    for place in ("/", "/plan", "/x/plan", token + "static/..%2fserver.py", token + "static/main.py", token + "plan/x"):
+    assert asked(served, "edit/geometry.js")[2]["content-type"].startswith("text/javascript")
+    for place in ("/", "/plan", "/x/plan", token + "static/..%2fserver.py", token + "edit/main.py", token + "plan/x"):
         assert asked(served, place)[0] == 404, place
     assert asked(served, "plan", host="evil.example")[0] == 404
     assert asked(served, "plan", origin="http://evil.example")[0] == 404

@@ -170,7 +170,7 @@ def test_a_door_in_a_wall_of_two_faces(browser: Any, tmp_path: Path) -> None:
                 "doors": [{"line": [3, 0.1, 4, 0.1]}]}  # fmt: skip
     with EditServer(tmp_path / "plan.json", port=0) as server, opened(browser, server) as page:
         cut, filled, closed = page.evaluate(
-            """async ([walls, imported]) => { const g = await import(location.href + 'static/geometry.js');
+            """async ([walls, imported]) => { const g = await import(location.href + 'edit/geometry.js');
             const cut = g.cutDoor({ walls }, 0, [4, 0.05], 0.9);
             const closed = (level) => g.closed(level.walls, level.doors[0].line);
             return [cut, closed(cut), closed(imported)]; }""",

@@ -161,6 +161,9 @@ def test_without_the_token_nothing_answers() -> None:
         assert len(token) >= 20
         for path in ("", "static/main.js", "lines/0", f"{token[:-1]}/", "../"):
             assert fetched(f"{local}/{path}").status == 404
+        with socket.create_connection(("127.0.0.1", int(port))) as raw:
+            raw.sendall(b"GET page HTTP/1.0\r\n\r\n")
+            assert b" 404 " in raw.recv(1000)
         with pytest.raises(InvalidStatus):
             connect(f"ws{local[4:]}/socket", origin=Origin(local), open_timeout=PATIENCE_S)
         page = fetched(f"{local}/{token}/")

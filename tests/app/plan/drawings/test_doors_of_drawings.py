@@ -41,12 +41,6 @@ def is_right(plan: Plan, walls: Walls = drawn.outlines) -> bool:
     return (doors, in_gaps, spaces) == (7, 7, 7) and abs(area - right) < 0.6
 
 
-@pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
-def test_walls_of_all_habits(tmp_path: Path, walls: Walls) -> None:
-    plan = import_plan(write_office(tmp_path / "a.dxf", walls))
-    assert is_right(plan, walls), facts(plan)
-
-
 @pytest.mark.parametrize("part", range(4))
 @pytest.mark.parametrize("walls", WALL_STYLES, ids=lambda walls: str(walls.__name__))
 def test_doors_of_all_habits_in_walls_of_all_habits(tmp_path: Path, walls: Walls, part: int) -> None:
@@ -174,3 +168,33 @@ def test_round_things_are_no_doors(tmp_path: Path) -> None:
     assert level.doors == ()
     assert report.left_out == {"ARC on A-FINE": 1, "CIRCLE on A-FINE": 1}
     assert len(level.walls) > 8
+
+
+@pytest.mark.parametrize("is_leaf", [True, False])
+@pytest.mark.parametrize("layer", ["A-WALL", "EXIT", "ENTREE_SORTIE", "0", "A-GLAZ"])
+def test_a_swing_on_any_layer_at_a_wall_drawn_through_is_a_door_or_a_question(
+    tmp_path: Path, layer: str, *, is_leaf: bool
+) -> None:
+    doc, space = sheet()
+    for box in ((0, 0, 10, 0.3), (0, 7.7, 10, 8), (0, 0.3, 0.3, 7.7), (9.7, 0.3, 10, 7.7)):
+        outlines(space, box)
+    space.add_arc((4, 0.3), 0.9, 0, 90, dxfattribs={"layer": layer})
+    if is_leaf:
+        space.add_line((4, 0.3), (4, 1.2), {"layer": layer})
+    level, report = imported(doc, tmp_path)
+    (question,) = level.questions
+    assert question.lines_m == ((4.0, 0.3, 4.9, 0.3),)
+    assert question.is_proposed is not is_leaf
+    assert len(level.doors) == is_leaf
+    assert "drawn through" in report.doubts[0]
+    assert (report.left_out == {}) is (is_leaf or layer in ("A-WALL", "A-GLAZ"))
+
+
+@pytest.mark.parametrize("layer", ["A-WALL-OPENINGS", "L00_FP_OPENINGS", "WANDOEFFNUNG"])
+def test_openings_are_doors(tmp_path: Path, layer: str) -> None:
+    doc, space = sheet()
+    house(space)
+    outlines(space, (4, 3, 4.1, 3.9), layer)
+    level, _ = imported(doc, tmp_path)
+    assert len(level.doors) == 1
+    assert len(level.walls) == 14

@@ -173,6 +173,20 @@ def test_other_layers_that_look_like_walls_are_told(tmp_path: Path) -> None:
     assert len(plan.levels[0].walls) > 14
 
 
+@pytest.mark.parametrize("layer", ["ENTREE_SORTIE", "FLUCHTWEG", "EINGANG", "Issue de secours", "EVACUATION"])
+def test_ways_out_are_no_walls_and_their_texts_no_names(tmp_path: Path, layer: str) -> None:
+    doc, space = sheet()
+    house(space)
+    for y in (1.0, 5.0):
+        outlines(space, (9.7, y, 10.0, y + 2.0), layer)
+    space.add_text("Hall", dxfattribs={"layer": "A-WALL", "insert": (1, 2), "height": 0.2})
+    space.add_text("OUT", dxfattribs={"layer": layer, "insert": (6, 2), "height": 0.3})
+    plan, report = imported(doc, tmp_path)
+    assert [room.name for room in plan.levels[0].rooms] == ["Hall"]
+    assert plan.levels[0].questions == ()
+    assert report.left_out == {f"LWPOLYLINE on {layer}": 2, f"TEXT on {layer}": 1}
+
+
 def test_most_walls_on_another_layer_are_asked_for(tmp_path: Path) -> None:
     doc, space = sheet()
     house(space, "X-17")
@@ -218,6 +232,40 @@ def test_a_reference_that_is_not_in_the_file_is_named(tmp_path: Path) -> None:
     plan, report = imported(doc, tmp_path)
     assert len(plan.levels[0].walls) == 14
     assert "floor-1.dwg is an external reference" in report.doubts[0]
+
+
+PARTS_OF_TEXT = {  # in shares of its width and height, from the middle to the point that the alignment is about
+    "LEFT": (-0.5, -0.5), "RIGHT": (0.5, -0.5), "TOP_CENTER": (0, 0.5), "MIDDLE": (0, 0), "FIT": (-0.5, -0.5), "MTEXT": (-0.5, 0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mirrored", [1, -1])
+@pytest.mark.parametrize("align", PARTS_OF_TEXT)
+def test_a_room_is_at_the_middle_of_its_name(tmp_path: Path, align: str, mirrored: int) -> None:
+    """Whatever the alignment: 0.3 m high, letters 0.8 of it wide; the paragraph is two lines of a column."""
+    doc, space = sheet()
+    house(space)
+    across, up = PARTS_OF_TEXT[align]
+    if align == "MTEXT":
+        text = space.add_mtext("Storeroom 12", dxfattribs={"layer": "Rooms", "char_height": 0.3, "width": 2.0})
+        text.dxf.insert = (5 + 2.0 * across, 4 + 0.8 * up)
+    else:
+        text = space.add_text("Storeroom 12", height=0.3, dxfattribs={"layer": "Rooms"})
+        at = (5 + 2.88 * across, 4 + 0.3 * up)
+        text.set_placement(at, (at[0] + 2.88, at[1]), align=TextEntityAlignment[align])
+    turned = Matrix44.z_rotate(math.radians(40)) @ Matrix44.scale(1, mirrored, 1)
+    for entity in space:
+        entity.transform(turned)
+    (room,) = imported(doc, tmp_path)[0].levels[0].rooms
+    assert room.at_m == pytest.approx(tuple(turned.transform((5, 4, 0)))[:2], abs=0.03)
+
+
+def test_a_name_without_a_direction_is_where_it_is_inserted(tmp_path: Path) -> None:
+    doc, space = sheet()
+    house(space)
+    text = {"layer": "Rooms", "height": 0.3, "insert": (7, 4), "extrusion": (0, 0, 1e308)}
+    space.add_text("Hall", dxfattribs=text)
+    assert [room.at_m for room in imported(doc, tmp_path)[0].levels[0].rooms] == [(7, 4)]
 
 
 @pytest.mark.parametrize("degrees", [0.0, 40.0, 90.0])

@@ -124,6 +124,11 @@ def on_paper(doc: Any) -> None:
         doc.layout("Layout1").add_entity(entity)
 
 
+def on_paper_beside_a_point(doc: Any) -> None:
+    on_paper(doc)
+    doc.modelspace().add_point((0, 0))
+
+
 def exits(doc: Any) -> None:
     """The entrance on a layer of its own."""
     for entity in doc.modelspace().query('ARC LINE[layer=="A-DOOR"]'):

@@ -74,3 +74,21 @@ def storeys_anywhere(made: Model) -> None:
     """Storeys placed far from their contents."""
     for k, storey in enumerate(made.file.by_type("IfcBuildingStorey")):
         made._put(storey, 3e5, 6e6, 3.0 * k, 0.0)
+
+
+def storeys_at_0(made: Model) -> None:
+    """Storeys placed at 0, whose Elevation is right."""
+    for k, storey in enumerate(made.file.by_type("IfcBuildingStorey")):
+        made._put(storey, 0.0, 0.0, 0.0, 0.0)
+        storey.Elevation = 3000.0 * k
+
+
+def elevations_0(made: Model) -> None:
+    """Storeys placed at their heights, whose Elevation is 0."""
+    for storey in made.file.by_type("IfcBuildingStorey"):
+        storey.Elevation = 0.0
+
+
+def wide_doors(made: Model) -> None:
+    for door in made.file.by_type("IfcDoor"):
+        door.OverallWidth = 2000.0

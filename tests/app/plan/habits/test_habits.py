@@ -165,6 +165,7 @@ OSM = [
             {"level": "0;1;2"}, {"level": "0-2"}, {"level": "0 ; 1-2;"}, {"level": "0", "repeat_on": "1;2"}, {"level": "0", "repeat_on": "1-2"},
         ))),
         *cells(kind, "level ranges", rows(kind, level={"level": "0,1,2"}), rows(kind, level={"level": "0..2"}), asks="write level=0;1 or level=0-2"),
+        *cells(kind, "contradictions", rows(kind, level={"level": "0-2", "building": "yes", "building:levels": "2"}), asks="building:levels=2, but"),
         *cells(kind, "spellings", rows(kind, sign=-1), rows(kind, entrance="entrance")),
         *cells(kind, "units", rows(kind, partial(osm.tagged, width="90 cm"))),
         *cells(kind, "units", *(rows(kind, partial(osm.tagged, width=wide)) for wide in ("90", "900", "wide")), asks="write it in metres"),
@@ -231,6 +232,8 @@ IMDF = [
     *cells("imdf", "thick walls", beside(0.08), beside(0.19)),
     *cells("imdf", "thick walls", beside(0.4), asks="openings lie in no wall"),
     *cells("imdf", "copied storeys", altered(lambda files: [f["properties"].update(ordinal=0) for f in files["level"]]), asks="m apart"),
+    *cells("imdf", "two buildings", altered(other.two_buildings), asks=r"^level 0: 2\d\.\d\d x 8.*as of several buildings, are one level"),
+    *cells("imdf", "contradictions", altered(other.names_turned), asks="by their names the storeys are Ground floor, First floor, Level 2"),
     *moved("own", other.own, Right()),
 ]  # fmt: skip
 
@@ -309,6 +312,7 @@ DRAWN = [
     *cells("dxf", "own layers", *(drawn(layers=pair) for pair in (("AR_Innenwände", "AR_Türen"), ("墙体", "门窗"))), right=THICK),
     *cells("dxf", "copied storeys", dxf.files, asks="names the storeys are EG, 1. OG, 2. OG from the lowest", level_names=("1. OG", "2. OG", "EG")),
     *cells("dxf", "own layers", drawn(layers=("0", "0")), asks="--layer walls=0"),
+    *cells("dxf", "own layers", drawn(change=dxf.on_paper_beside_a_point), asks="copy it to the model space"),
     *(Cell("dxf", "beside the house", drawn(change=partial(dxf.sheet, parts=parts)), move, r"--window -?[0-9.,-]+", THICK)
       for parts in ("frame", "frame title", "title", "arrow", "frame title arrow") for move in (STAY, FAR[0])),
     *cells("dxf", "beside the house", drawn(change=dxf.titles), asks="3 names lie beside the walls"),
@@ -322,16 +326,14 @@ MODELS = [
     *cells("ifc", "units", *(partial(model.write, units=name) for name in ("FEET", "INCHES", "METERS")), right=SOLID),
     *cells("ifc", "spellings", partial(model.write, schema="IFC2X3"), partial(model.write, z=312.4), right=SOLID),
     *cells("ifc", "far", partial(model.write, change=model.storeys_anywhere), right=SOLID),
-    *cells(
-        "ifc",
-        "datum",
-        partial(model.write, change=lambda made: georeference.add_georeferencing(made.file)),
-        asks="map conversion",
-    ),
+    *cells("ifc", "datum", partial(model.write, change=lambda made: georeference.add_georeferencing(made.file)), asks="map conversion"),
+    *cells("ifc", "contradictions", partial(model.write, change=model.storeys_at_0), asks="^note: .*6.00 m.: Elevation is taken", right=SOLID),
+    *cells("ifc", "contradictions", partial(model.write, change=model.elevations_0), asks="^note: .*0.00 m.: placement is taken", right=SOLID),
+    *cells("ifc", "contradictions", partial(model.write, change=model.wide_doors), asks="OverallWidth and opening of 4 doors differ"),
     *cells("ifc", "solid walls", partial(model.write, voids=False), right=SOLID),
     *cells("ifc", "solid walls", partial(model.write, voids=False, thick=0.4), right=Right(0.4)),
     *cells("ifc", "thick walls", partial(model.write, thick=0.6), right=Right(0.6)),
-]
+]  # fmt: skip
 
 
 def outcome(cell: Cell, folder: Path) -> str:

@@ -11,28 +11,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from board_runs import ROOT
+from aiding.team.two_wearers import BUILDING, PLAN
 from echostep.aiding import AidedFilter, MeetingEffect, on_the_way, start_at
 from echostep.aiding.team.meeting import WRONG, Meeting, covariance
 from echostep.aiding.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
 from echostep.aiding.team.meetings import best_omega, information, places_at, weigh
 from echostep.arrays import Floats
-from echostep.localization import Building, CloudSettings, Start
+from echostep.localization import CloudSettings, Start
 from echostep.localization.belief import Belief
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED
 from echostep.path import Odometer, PathSegment
-from echostep.plan import Plan, Pose, load_plan
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, MeetingMessage, parse_meeting
 from echostep.tracker import Tracker
-from echostep.walls.level_sheet import lay_out_levels
 from walks import walk_chunks
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 AREA_M2 = 250.0
 KIM = Meeting("kim", "tracking", 4.0, 5.0, 0, 0.01, 0.0, 0.01)
 FAR = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025)
+ANNA, BO = replace(FAR, name="anna"), replace(FAR, name="bo")
 FAR_MESSAGE = MeetingMessage("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025)
 
 
@@ -44,21 +43,9 @@ def cloud(mean: tuple[float, float], sd: tuple[float, float], size: int = 20_000
     return made
 
 
-def elsewhere(name: str) -> Meeting:
-    return Meeting(name, "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025)
-
-
 def moments(c: Cloud) -> tuple[Floats, Floats]:
     place = np.column_stack([c.x_m, c.y_m])
     return c.weight @ place, np.cov(place, rowvar=False, aweights=c.weight, bias=True)
-
-
-def building(plan: Plan = PLAN) -> Building:
-    laid_out = lay_out_levels(plan)
-    return Building(laid_out.walls, laid_out.sheet)
-
-
-BUILDING = building()
 
 
 def filter_at(x_m: float, y_m: float, right: float) -> AidedFilter:
@@ -164,7 +151,7 @@ def test_a_teammate_elsewhere_does_not_pull_a_sure_cloud() -> None:
     sure = filter_at(4.0, 7.5, 0.9999)
     before, drawn = sure.cloud.x_m.copy(), sure._rng.bit_generator.state
     for name in ("eve", "mallory"):
-        assert sure.meet(elsewhere(name)) is MeetingEffect.CONTRADICTS
+        assert sure.meet(replace(FAR, name=name)) is MeetingEffect.CONTRADICTS
     assert np.array_equal(sure.cloud.x_m, before)
     assert sure.belief.probability(sure.belief.tracked) == pytest.approx(0.9999)
     assert sure._rng.bit_generator.state == drawn
@@ -172,31 +159,27 @@ def test_a_teammate_elsewhere_does_not_pull_a_sure_cloud() -> None:
 
 def test_a_stated_start_is_given_up_when_a_second_teammate_contradicts() -> None:
     stated = filter_at(4.0, 7.5, STATED)
-    assert stated.meet(elsewhere("anna")) is MeetingEffect.CONTRADICTS
-    assert stated.meet(elsewhere("anna")) is MeetingEffect.REPEATED
-    assert stated.meet(elsewhere("bo")) is MeetingEffect.MOVED
+    assert stated.meet(ANNA) is MeetingEffect.CONTRADICTS
+    assert stated.meet(ANNA) is MeetingEffect.REPEATED
+    assert stated.meet(BO) is MeetingEffect.MOVED
 
 
 def test_an_agreement_answers_a_contradiction() -> None:
     stated = filter_at(4.0, 7.5, STATED)
     beside = Meeting("kim", "tracking", 4.3, 7.4, 0, 0.01, 0.0, 0.01)
-    effects = [stated.meet(met) for met in (elsewhere("anna"), beside, elsewhere("bo"))]
+    effects = [stated.meet(met) for met in (ANNA, beside, BO)]
     assert effects == [MeetingEffect.CONTRADICTS, MeetingEffect.USED, MeetingEffect.CONTRADICTS]
 
 
-def test_a_far_radio_range_moves_no_cloud() -> None:
+@pytest.mark.parametrize(("range_m", "moved"), [(PLACE_M + 0.1, False), (1.0, True)])
+def test_a_near_radio_range_moves_a_doubted_cloud_about_the_teammate_and_a_far_one_none(
+    range_m: float, moved: bool
+) -> None:
     doubted = filter_at(4.0, 7.5, 0.4)
-    by_radio = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025, range_m=PLACE_M + 0.1, range_sd_m=0.1)
-    assert doubted.meet(by_radio) is MeetingEffect.CONTRADICTS
-
-
-def test_a_near_radio_range_moves_a_doubted_cloud_about_the_teammate() -> None:
-    doubted = filter_at(4.0, 7.5, 0.4)
-    by_radio = Meeting("eve", "tracking", 20.0, 2.0, 0, 0.0025, 0.0, 0.0025, range_m=1.0, range_sd_m=0.1)
-    assert doubted.meet(by_radio) is MeetingEffect.MOVED
-    cloud = doubted.cloud
-    near = np.hypot(cloud.map_x_m - 20.0, cloud.y_m - 2.0) < 2.5
-    assert float(cloud.weight @ near) > 0.95
+    effect = doubted.meet(replace(FAR, range_m=range_m, range_sd_m=0.1))
+    assert effect is (MeetingEffect.MOVED if moved else MeetingEffect.CONTRADICTS)
+    near = np.hypot(doubted.cloud.map_x_m - 20.0, doubted.cloud.y_m - 2.0) < 2.5
+    assert (float(doubted.cloud.weight @ near) > 0.95) == moved
 
 
 def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:

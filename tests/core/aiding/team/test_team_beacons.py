@@ -10,22 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aiding.team.two_wearers import PLAN, Two, told, two_wearers
+from aiding.team.two_wearers import BUILDING, PLAN, Two, told, two_wearers
 from echostep.aiding import MOST_TEAMMATES, AidedFilter, MeetingEffect, MeetingQueue, TeamBeaconMap
 from echostep.aiding.team.meeting import Meeting
 from echostep.aiding.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.board.gateway import BeaconReading
-from echostep.localization import Building, Start, digest
+from echostep.localization import Start, digest
 from echostep.localization.belief import Belief
 from echostep.path import Odometer
 from echostep.plan import Pose
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, parse_team_beacons
 from echostep.tracker import Tracker
-from echostep.walls.level_sheet import lay_out_levels
 
-LAID_OUT = lay_out_levels(PLAN)
-BUILDING = Building(LAID_OUT.walls, LAID_OUT.sheet)
 BEACON = SharedBeacon(7, 4.0, 7.5, 0, 0.01, 0.0, 0.01)
 
 

@@ -3,35 +3,30 @@
 
 from __future__ import annotations
 
-import heapq
 import random
 from dataclasses import dataclass
 from functools import cache
-from operator import attrgetter
 
 import numpy as np
 
-from board_runs import ROOT
-from echostep.localization import Estimate, Start
-from echostep.plan import Pose, load_plan
+from beacons.beacon_walk import SEED, demo, heard, merged
+from echostep.localization import Building, Estimate, Start
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons
 from echostep.tracker import Tracker
-from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
+from echostep.walls.level_sheet import lay_out_levels
+from echostep_simulation.devices.beacon_gateway import lay_beacons
 from echostep_simulation.devices.board import PythonBoard
-from echostep_simulation.scenario import START_NS, Scenario
+from echostep_simulation.scenario import Scenario
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
-
-SEED = 5
-
-
-RUN = "0000beac"
+PLAN = demo()
+LAID_OUT = lay_out_levels(PLAN)
+BUILDING = Building(LAID_OUT.walls, LAID_OUT.sheet)
 
 
 def told(*beacons: SharedBeacon, name: str = "kim") -> TeamBeacons:
-    return TeamBeacons(1, name, RUN, PLAN.digest, beacons)
+    return TeamBeacons(1, name, "0000beac", PLAN.digest, beacons)
 
 
 @dataclass
@@ -60,10 +55,7 @@ def two_wearers() -> Two:
     scenario = Scenario(PLAN, ((2.0, 7.5), (16.0, 7.5)), SEED, PythonBoard(seed=SEED))
     truth = scenario.truth
     places = lay_beacons(truth[:, 1:3], 5.0, np.random.default_rng(SEED))
-    arrival_ns = START_NS + np.rint(1e9 * truth[:, 0]).astype(np.int64)
-    world = BeaconWorld(places, PLAN.levels[0].walls)
-    said = gateway_chunks(world, truth[:, 0], truth[:, 1:3], arrival_ns, SEED)
-    chunks = list(heapq.merge(scenario.chunks(), said, key=attrgetter("t_arrival_ns")))
+    chunks = merged(scenario.chunks(), heard(truth, places))
     placing = Tracker(PLAN, scenario.start, seed=1)
     placing.take(portion_of(chunks))
     beacons = placing.own_beacons()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The panel of questions: shows one after the other, and gives the answers to the sheet. In: sheet, view, tools, desk. Owns the question that is shown.
 
-import { tr } from './language.js';
+import { tr } from '../static/language.js';
 import { accept, put, reject } from './questions.js';
 import { WORDS } from './words.js';
 

@@ -2,23 +2,21 @@
 // The plan editor: loads the plan and the picture, connects sheet, tools, view and buttons, saves. A *level* is an index into the plan's levels.
 
 import { Asking } from './asking.js';
-import { ask, isOpen } from './dialogs.js';
 import { elementsOf } from './elements.js';
 import { box } from './geometry.js';
 import { paint } from './paint.js';
-import { localise, missing, tr } from './language.js';
+import { localise, missing, tr } from '../static/language.js';
 import { Pointer } from './pointer.js';
-import { paintBar, stepOf } from './scale.js';
 import { Sheet } from './sheet.js';
-import { recall, remember } from './storage.js';
-import { startTheme } from './theme.js';
+import { startTheme } from '../static/theme.js';
+import { showScale } from '../static/tools/units.js';
 import { Tools } from './tools.js';
-import { View } from './view.js';
+import { View } from '../static/view.js';
 import { HINTS, WORDS } from './words.js';
 
 const byId = (id) => document.getElementById(id);
 const KEYS = { v: 'select', w: 'wall', d: 'door', n: 'room', s: 'scale' };
-const FIRST_WIDTH_M = 20; // of a picture without a scale
+const STEPS_M = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 25, 50, 100, 250], STEP_PX = 14; // of an arrow key: the first that is so long
 const view = new View(), map = byId('map');
 let sheet, tools, asking, stamp, waiting = false, checked = {};
 
@@ -35,7 +33,7 @@ function changed() {
 function draw() {
   waiting = false;
   asking.paint();
-  paintBar(view);
+  showScale(view);
   paint(tools, view, asking.current);
   const pressed = { rectangle: !tools.isLasso, lasso: tools.isLasso, add: tools.adds };
   for (const [id, is] of Object.entries(pressed)) byId(id).setAttribute('aria-pressed', String(is));
@@ -49,12 +47,11 @@ function draw() {
   if (names.join('\n') !== [...options.options].map((o) => o.text).join('\n')) options.replaceChildren(...names.map((name, k) => new Option(name, k)));
   options.value = sheet.k;
   options.hidden = names.length < 2;
-  if (sheet.picture) remember(`picture of ${sheet.tree.name}`, JSON.stringify(sheet.picture));
 }
 
 function show() {
-  const { picture } = sheet, rows = elementsOf(sheet.tree, sheet.k).flatMap((element) => element.rows);
-  view.fit(box(picture ? [...rows, [0, 0, picture.width * picture.perPx, picture.height * picture.perPx]] : rows));
+  const { picture } = sheet, rows = elementsOf(sheet.tree, sheet.k).flatMap((element) => element.rows), [perPx, x, y] = picture ? sheet.lies : [];
+  view.fit(box(picture ? [...rows, [x, y, x + picture.width * perPx, y + picture.height * perPx]] : rows));
   changed();
 }
 
@@ -108,7 +105,7 @@ function turn(way) {
 }
 
 function step(e, [dx, dy]) {
-  const by = e.shiftKey ? 0.05 : stepOf(view), [x, y] = tools.cross;
+  const by = e.shiftKey ? 0.05 : STEPS_M.find((m) => m * view.scale >= STEP_PX) ?? STEPS_M.at(-1), [x, y] = tools.cross;
   tools.move([Math.round((x + dx * by) / 0.05) * 0.05, Math.round((y + dy * by) / 0.05) * 0.05]);
   view.keep(...tools.cross);
   if (!tools.draft && !tools.area) say(WORDS.cross(tools.cross));
@@ -141,8 +138,7 @@ function escape() {
 
 function key(e) {
   const ctrl = e.ctrlKey || e.metaKey, name = e.key.length === 1 ? e.key.toLowerCase() : e.key;
-  if (isOpen()) return;
-  if (e.key === '?' && document.activeElement.tagName !== 'INPUT') { byId('keys').classList.toggle('unseen'); return; }
+  if (e.key === '?') { byId('keys').classList.toggle('unseen'); return; }
   const always = ctrl && { s: save, z: () => turn(e.shiftKey ? 'redo' : 'undo'), y: () => turn('redo') }[name];
   if (always) { e.preventDefault(); always(); return; }
   if (ctrl || e.altKey || document.activeElement !== map) return;
@@ -163,7 +159,7 @@ function pick(name) {
   changed();
 }
 
-async function loadPicture(name) {
+async function loadPicture() {
   const answer = await fetch('picture');
   if (answer.status !== 200) return;
   const image = new Image();
@@ -173,10 +169,7 @@ async function loadPicture(name) {
   byId('image').setAttribute('href', image.src);
   byId('image').setAttribute('width', width);
   byId('image').setAttribute('height', height);
-  let kept = null;
-  try { kept = JSON.parse(recall(`picture of ${name}`)); } catch { /* not of this page */ }
-  const fits = kept?.width === width && kept.height === height && kept.perPx > 0;
-  sheet.picture = fits ? kept : { perPx: FIRST_WIDTH_M / width, width, height, set: false };
+  sheet.picture = { width, height };
 }
 
 async function start() {
@@ -185,8 +178,8 @@ async function start() {
   if (!answer.ok) { wrong(tree.error); return; }
   stamp = answer.headers.get('etag');
   sheet = new Sheet(tree, say);
-  await loadPicture(tree.name);
-  tools = new Tools(sheet, view, { ask, say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
+  await loadPicture();
+  tools = new Tools(sheet, view, { say, changed, asked: (question) => asking.show(question, false), placed: (p) => asking.placed(p) });
   asking = new Asking(sheet, view, tools, { say, changed });
   new Pointer(map, view, { down: (p, e) => tools.down(p, e.altKey || e.ctrlKey), move: (p) => tools.move(p), up: (p, isTap, e) => tools.up(p, isTap, e.shiftKey), cancel: () => { tools.cancel(); changed(); }, moved: changed });
   new ResizeObserver(() => { view.resize(map.clientWidth, map.clientHeight); changed(); }).observe(map);
@@ -205,8 +198,8 @@ async function start() {
   startTheme(byId('look'), changed);
   addEventListener('beforeunload', (e) => { if (sheet.unsaved) e.preventDefault(); });
   const asked = asking.open.length && WORDS.questions(asking.open.length);
-  say(sheet.picture && !sheet.picture.set ? WORDS.scaleFirst : asked || HINTS.select);
-  window.echostep = { view, sheet, tools, asking, isOpen, missing, tr };
+  say(sheet.picture && !tree.picture ? WORDS.scaleFirst : asked || HINTS.select);
+  window.echostep = { view, sheet, tools, asking, missing, tr };
 }
 
 start().catch((error) => wrong(WORDS.noStart(error.message)));

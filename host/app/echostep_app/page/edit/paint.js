@@ -3,8 +3,8 @@
 
 import { connectorsOf, startOn } from './elements.js';
 import { ends, length, middle } from './geometry.js';
-import { tr } from './language.js';
-import { halfOf, isFree } from './plan.js';
+import { tr } from '../static/language.js';
+import { halfOf, isFree } from '../static/plan.js';
 import { KINDS, WORDS } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -58,11 +58,12 @@ function freeNames(rows, view) {
 }
 
 export function paint(tools, view, shown) {
-  const { sheet: { tree, k, level, picture }, area, chain, cross, draft } = tools, outlines = (rows) => rows.map((corners) => `M${corners.map((p) => p.join(' ')).join('L')}Z`).join('');
+  const { sheet, sheet: { tree, k, level, picture }, area, chain, cross, draft } = tools, outlines = (rows) => rows.map((corners) => `M${corners.map((p) => p.join(' ')).join('L')}Z`).join('');
   byId('world').setAttribute('transform', `matrix(${view.matrix().join(' ')})`);
   const image = byId('image');
   image.toggleAttribute('hidden', !picture);
-  if (picture) image.setAttribute('transform', `matrix(${picture.perPx} 0 0 ${-picture.perPx} 0 ${picture.height * picture.perPx})`);
+  const [perPx, x0, y0] = picture ? sheet.lies : [];
+  if (picture) image.setAttribute('transform', `matrix(${perPx} 0 0 ${-perPx} ${x0} ${y0 + picture.height * perPx})`);
   const below = tree.levels.filter(({ height_m }) => height_m < level.height_m).sort((a, b) => b.height_m - a.height_m)[0];
   const lines = {
     below: path(below?.walls ?? []), walls: path(level.walls), windows: path(level.windows ?? []), doors: path((level.doors ?? []).map((door) => door.line)),

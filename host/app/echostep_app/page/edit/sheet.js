@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The sheet: the plan and the picture's scale, with undo and redo. Owns the history; every change makes a new tree and says in a sentence what it did.
+// The sheet: the plan, with undo and redo, and the size of the picture. Owns the history; every change makes a new tree and says in a sentence what it did.
 
 import { settled } from './questions.js';
 import { WORDS } from './words.js';
 
 const MOST_KEPT = 300; // changes that can be undone
+const FIRST_WIDTH_M = 20; // of a picture without a scale
 
 export class Sheet {
   constructor(tree, say) { Object.assign(this, { tree, say, picture: null, k: 0, past: [], future: [], saved: tree }); }
@@ -12,10 +13,13 @@ export class Sheet {
   get level() { return this.tree.levels[this.k]; }
   get unsaved() { return this.tree !== this.saved; }
 
-  change(tree, words, picture = this.picture) {
-    this.past.push({ tree: this.tree, picture: this.picture, words });
+  // Metres a pixel and the lower left corner of the picture.
+  get lies() { return this.tree.picture ?? [FIRST_WIDTH_M / this.picture.width, 0, 0]; }
+
+  change(tree, words) {
+    this.past.push({ tree: this.tree, words });
     if (this.past.length > MOST_KEPT) this.past.shift();
-    Object.assign(this, { tree, picture, future: [] });
+    Object.assign(this, { tree, future: [] });
     this.say(words);
   }
 
@@ -26,9 +30,9 @@ export class Sheet {
 
   go(from, to, told) {
     if (!from.length) return;
-    const { tree, picture, words } = from.pop();
-    to.push({ tree: this.tree, picture: this.picture, words });
-    Object.assign(this, { tree, picture, k: Math.min(this.k, tree.levels.length - 1) });
+    const { tree, words } = from.pop();
+    to.push({ tree: this.tree, words });
+    Object.assign(this, { tree, k: Math.min(this.k, tree.levels.length - 1) });
     this.say(told(words));
   }
 }

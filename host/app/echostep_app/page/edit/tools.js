@@ -3,6 +3,7 @@
 
 import { elementAt, elementsOf, elementsWithin, without } from './elements.js';
 import { cutDoor, distance, foot, length, onGrid, rectangle, round, same, snap } from './geometry.js';
+import { tr } from '../static/language.js';
 import { questionAt } from './questions.js';
 import { WORDS } from './words.js';
 
@@ -11,7 +12,7 @@ const TWO_POINTS = ['wall', 'door', 'scale']; // verbs that take two points: by 
 const NARROWEST_M = 0.3; // of a door
 
 export class Tools {
-  // `desk`: ask(question, answer) -> promise of a text or null, say(text), changed(), asked(question), placed(position)
+  // `desk`: say(text), changed(), asked(question), placed(position)
   constructor(sheet, view, desk) {
     Object.assign(this, { sheet, view, desk, name: 'select', isLasso: false, adds: false, chosen: new Set(), pressed: null, area: null, chain: null, draft: null, cross: [0, 0] });
   }
@@ -118,22 +119,22 @@ export class Tools {
     else this.desk.say(WORDS.noWall);
   }
 
-  async room(p) {
-    const { level, k } = this.sheet, rooms = level.rooms ?? [], index = rooms.findIndex(({ at }) => distance(at, p) <= this.reach);
-    const name = (await this.desk.ask(WORDS.roomName, rooms[index]?.name ?? ''))?.trim();
-    if (!name || this.sheet.k !== k) return;
+  room(p) {
+    const { level } = this.sheet, rooms = level.rooms ?? [], index = rooms.findIndex(({ at }) => distance(at, p) <= this.reach);
+    const name = prompt(tr(WORDS.roomName), rooms[index]?.name ?? '')?.trim();
+    if (!name) return;
     this.sheet.setLevel({ ...level, rooms: index < 0 ? [...rooms, { name, at: p.map(onGrid) }] : rooms.with(index, { ...rooms[index], name }) }, WORDS.room(name));
     this.desk.changed();
   }
 
   place(p) { this.desk.placed(p); }
 
-  async scale(from, { at }) {
-    const { sheet, desk } = this, { picture } = sheet;
+  scale(from, { at }) {
+    const { sheet, desk } = this;
     this.stop();
-    if (!picture) { desk.say(WORDS.noPicture); return; }
-    const metres = Number((await desk.ask(WORDS.distance, ''))?.replace(',', '.') ?? 0), perPx = picture.perPx * metres / distance(from, at);
-    if (metres > 0 && metres < 1e5 && Number.isFinite(perPx)) sheet.change(sheet.tree, WORDS.scaled(round(perPx)), { ...picture, perPx, set: true });
+    if (!sheet.picture) { desk.say(WORDS.noPicture); return; }
+    const [before, ...corner] = sheet.lies, metres = Number(prompt(tr(WORDS.distance))?.replace(',', '.') ?? 0), perPx = before * metres / distance(from, at);
+    if (metres > 0 && metres < 1e5 && Number.isFinite(perPx)) sheet.change({ ...sheet.tree, picture: [perPx, ...corner] }, WORDS.scaled(round(perPx)));
     else desk.say(WORDS.noScale);
     desk.changed();
   }

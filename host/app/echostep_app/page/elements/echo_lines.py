@@ -16,7 +16,7 @@ from echostep.echoes.likelihood import EchoModel, likeliest_source
 from echostep.jit import kernel
 from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.walls.echo_sources import echo_sources, one_receiver
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.index import WallIndex
 
 
@@ -37,7 +37,7 @@ class EchoLine:
 
 
 def last_echo_lines(
-    measured: MeasuredSegment, estimate: Estimate, east_m: float, index: WallIndex, model: EchoModel
+    measured: MeasuredSegment, estimate: Estimate, east_m: float, walls: Walls, model: EchoModel
 ) -> tuple[EchoLine, ...]:
     """The last ping of each ranger on a measured segment, at the pose that the estimate gives for the time of the ping.
 
@@ -51,6 +51,7 @@ def last_echo_lines(
         ping_s, range_m = float(measured.t_s[rows[-1]]), float(measured.range_m[rows[-1]])
         x, y, heading_rad = _trunk_pose(measured, estimate, ping_s)
         axis = heading_rad + float(measured.off_heading_rad[rows[-1]])
+        index = walls.near(np.array([x + east_m]), np.array([y]))
         expected = expected_range(x + east_m, y, axis, index, model)
         ranges = (None if math.isnan(v) else float(v) for v in (range_m, expected))
         lines.append(EchoLine(ping_s, ranger, x, y, axis, *ranges))

@@ -19,6 +19,7 @@ const BUILDING = [
   [JOINED + line(JAMBS), 'door that is open'],
   [JOINED + line(`${JAMBS}M-9 0H9`), 'door that is shut'],
   [JOINED + line(JAMBS) + line('M-9 0H9', 'wall', 1.5, 'stroke-dasharray="3 3"'), 'door, open or shut; to which side it opens is in no plan'],
+  [JOINED + line(JAMBS) + line('M0-11V11', 'good', 3), 'way out of the building, with the word EXIT'],
   [line(BOX + STEPS), 'stairs; ↑ ↓ beside the name: they lead up, down'],
   [line(`${BOX}M-12-7 12 7M-12 7 12-7`), 'lift'],
   [line(`${BOX}M-12 0H12M-12 0-8-3M-12 0-8 3M12 0 8-3M12 0 8 3`), 'ramp'],

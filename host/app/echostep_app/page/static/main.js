@@ -135,6 +135,7 @@ function draw() {
   if (drawnStamp !== view.stamp) {
     planView.draw(view);
     showScale(view);
+    $('needle').style.transform = `rotate(${-view.tilt}rad)`;
     drawnStamp = view.stamp;
   }
   parts.paint();

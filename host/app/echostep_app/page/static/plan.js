@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
-// One level of the plan in SVG: lines as paths by tiles, of which only those on the screen are in the document; names of rooms, stairs and lifts, always upright.
+// One level of the plan in SVG: lines as paths by tiles, of which only those on the screen are in the document; names of rooms, stairs and lifts and signs
+// of exits, always upright.
+
+import { tr } from './language.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const TILE_M = 30;  // side of a tile
-const LEAST_PX = { wall: 1, window: 4, door: 2, unknown: 2, stairs: 6, lift: 6, ramp: 6 };  // length of the shortest lines drawn, by kind
+const LEAST_PX = { wall: 1, window: 4, door: 2, unknown: 2, exit: 0, stairs: 6, lift: 6, ramp: 6 };  // length of the shortest lines drawn, by kind
 const NOTHING_DRAWN = [-10, -10, 10, 10];  // m about the origin, shown where there is no plan
 const KEPT_PX = 22;  // distance of names from signs
 
@@ -12,14 +15,15 @@ export class PlanView {
     Object.assign(this, { wallsGroup, roomsGroup, tiles: [], rooms: [], lines: {}, signs: [], box: [0, 0, 10, 10], isEmpty: true });
   }
 
-  // `bytes`: of the server's lines/N; stairs and lifts keep their names where a room's would cover one.
+  // `bytes`: of the server's lines/N; exits, then stairs and lifts keep their names where another would cover one.
   show(bytes, { rooms, ways }) {
     const lines = this.lines = linesOf(bytes);
     this.tiles = Object.entries(lines).flatMap(([kind, rows]) => tilesOf(rows, kind));
     this.box = boxOf(lines, [...rooms, ...ways]);
     this.isEmpty = this.box === NOTHING_DRAWN;
     this.wallsGroup.replaceChildren();
-    this.rooms = [...ways.map((way) => ({ ...way, kind: 'way' })), ...rooms].map(({ name, at_m: [x, y], kind = 'room' }) => {
+    const exits = Array.from({ length: lines.exit.length / 4 }, (_, k) => ({ name: tr('EXIT'), at_m: lines.exit.subarray(4 * k + 2, 4 * k + 4), kind: 'exit' }));
+    this.rooms = [...exits, ...ways.map((way) => ({ ...way, kind: 'way' })), ...rooms].map(({ name, at_m: [x, y], kind = 'room' }) => {
       const text = document.createElementNS(SVG, 'text');
       text.textContent = name;
       text.classList.add(kind);

@@ -91,7 +91,7 @@ class AccessControl:
                     "a proxy before it must send Host: 127.0.0.1 and its own name as X-Forwarded-Host",
                 )
                 return False
-        elif not hmac.compare_digest(scope["path"].split("/")[1].encode(), self._token.encode()):
+        elif not hmac.compare_digest(f"{scope['path']}/".split("/")[1].encode(), self._token.encode()):
             return False
         if origin is None:
             return bool(scope["type"] == "http")

@@ -19,6 +19,7 @@ from echostep.plan import Plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.parsing import FORMATS, GML
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.storey_names import in_order
 from echostep_app.plan.writer import plan_json
 
 # Traced with --scale
@@ -42,6 +43,7 @@ NEXT_STEPS = {  # formats that are not read, and what to do
 }  # fmt: skip
 # Files that are not read as plan.json
 OTHERS = {".dxf", ".geojson", ".ifc", ".ifczip", ".imdf", ".osm", ".xml", ".yaml", ".yml", ".zip", *NEXT_STEPS}
+ORDER = "give drawings in this order, correct the heights in other files"
 HALF_STOREY_M = 1.5  # closer levels are told; assumed
 SNIFFED_BYTES = 4096  # read to recognise a format
 
@@ -64,6 +66,11 @@ def import_plan(
         raise EchostepError(f"{path}: {' and '.join(given)} {'are' if given[1:] else 'is'} for drawings (DXF) alone")
     report = ImportReport() if report is None else report
     plan = _imported(path, hints, above, report)
+    names = [level.name for level in plan.levels]
+    if (order := in_order(names)) != names:
+        report.doubt(
+            f"by their names the storeys are {', '.join(order)[:99]} from the lowest, not {', '.join(names)[:99]}: {ORDER}"
+        )
     for low, up in pairwise(plan.levels):
         if (off_m := up.height_m - low.height_m) < HALF_STOREY_M:
             report.doubt(f"levels {low.name} and {up.name} are {off_m:.2f} m apart: half storeys, or reference levels?")

@@ -17,6 +17,7 @@ from echostep.arrays import Floats
 from echostep.plan import Door, Level, Plan
 from echostep_app.plan.cropping import extent
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.places.faces import is_walled
 from echostep_app.plan.places.gaps import door_gaps
 
 MOST_LINES = 12
@@ -24,9 +25,7 @@ MOST_LEVELS, MOST_DOUBTS = 5, 4  # lines on levels, and on doubts; more of them 
 MOST_NAMES = 6  # kinds and layers in one line
 AT_WALL_M = 0.15  # greatest distance of both ends of a door from a wall: issue 44's bound for a door in a gap
 SIZES_M, DOORS_M = (2.5, 1500.0), (0.5, 3.0)  # plausible sizes of a level, and of half of the doors; assumed
-THROUGH_M = 0.2  # to both sides of a door, one of which must be free: half the thickness of a wall; assumed
 ASKEW = 1e-3  # of walls that are drawn at right angles, at most: a degree; assumed
-CLEAR_M = 0.01  # a wall nearer than this to a door's middle part runs through it
 
 
 def summary(plan: Plan, report: ImportReport) -> list[str]:
@@ -63,24 +62,13 @@ def doors_in_gaps(level: Level) -> int:
 
 
 def _in_gap(door: Door, tree: shapely.STRtree, doors: Sequence[Door]) -> bool:
-    line = shapely.LineString((door.line[:2], door.line[2:]))
-    inner = shapely.LineString((line.interpolate(0.2, normalized=True), line.interpolate(0.8, normalized=True)))
     ends = shapely.points(np.array(door.line).reshape(2, 2))
     at_wall = [len(tree.query(end, predicate="dwithin", distance=AT_WALL_M)) > 0 for end in ends]
     if not all(at_wall):
         others = [shapely.LineString((other.line[:2], other.line[2:])) for other in doors if other is not door]
         beside = shapely.union_all(others)
         at_wall = [one or beside.distance(end) < AT_WALL_M for one, end in zip(at_wall, ends, strict=True)]
-    through, *sides = (len(tree.query(way, predicate="dwithin", distance=CLEAR_M)) for way in (inner, *_sides(door)))
-    return all(at_wall) and not through and not all(sides)
-
-
-def _sides(door: Door) -> tuple[shapely.LineString, shapely.LineString]:
-    """The ways from a door's middle to both its sides: both are blocked inside a wall that is drawn with its thickness and without a gap."""
-    x0, y0, x1, y1 = door.line
-    x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    u, v = THROUGH_M * (y1 - y0) / door.width_m, THROUGH_M * (x0 - x1) / door.width_m
-    return shapely.LineString([(x, y), (x - u, y - v)]), shapely.LineString([(x, y), (x + u, y + v)])
+    return all(at_wall) and not is_walled(door, tree)
 
 
 def size_m(level: Level) -> tuple[float, float]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of plans, PNG, SVG or PDF: rooms, walls, windows, doors, stairs and lifts, and the findings of the check.
+"""Pictures of plans, PNG, SVG or PDF: rooms, walls, windows, doors, exits, stairs and lifts, and the findings of the check.
 
 In: a `Plan`, levels, a rectangle, findings. Out: a file. Owns the colours.
 """
@@ -17,6 +17,7 @@ import numpy as np
 from echostep.plan import Connector, Level, Plan, Pose, Room
 from echostep_app.plan.cropping import Bounds, extent, within
 from echostep_app.plan.pictures.labels import Label, draw_labels, fonts_for
+from echostep_app.plan.pictures.symbols import exit_lines
 from echostep_app.plan.places.faces import find_faces
 from echostep_app.plan.places.spaces import MOST_WALLS
 from echostep_app.printing.picture_files import check_picture, save_picture, svg_text
@@ -36,16 +37,9 @@ LEVEL_WIDTH_PX = 900  # least width of a level
 GROUND = (1.0, 1.0, 1.0, 0.85)  # of a picture that lies on a map
 BARE_DPI = 150  # of a picture without frame: lines are twice as wide in pixels as in points
 MANY = 20_000  # with more lines than this, pixels are drawn instead of lines
-BESIDE_RING_PT = (
-    (9.0, 9.0),
-    (9.0, -9.0),
-    (-9.0, 9.0),
-    (-9.0, -9.0),
-    (0.0, 14.0),
-    (0.0, -14.0),
-    (16.0, 0.0),
-    (-16.0, 0.0),
-)  # of a finding's number
+BESIDE_RING_PT = (  # of a finding's number
+    (9.0, 9.0), (9.0, -9.0), (-9.0, 9.0), (-9.0, -9.0), (0.0, 14.0), (0.0, -14.0), (16.0, 0.0), (-16.0, 0.0),
+)  # fmt: skip
 MOST_NAMES = 500  # names of rooms on one level; with more of them none is drawn, because they cannot be read
 
 
@@ -117,14 +111,15 @@ def plan_figure(
     for number, i in enumerate(levels):
         drawn[i] = figure.add_subplot(rows, columns, number + 1, aspect="equal")
         _draw_level(drawn[i], plan, i, view, [f for f in findings if f.level == i])
-        if layer is not None:
-            layer.draw(drawn[i], i)
-            figure.suptitle(shown(layer.title), size=10, parse_math=False)
+    if layer is not None:
+        figure.suptitle(shown(layer.title), size=10, parse_math=False)
     _draw_legend(figure, plan, levels, layer.legend if layer else ())
     layout.execute(figure)
     figure.set_layout_engine("none")
     for i, axes in drawn.items():
         axes.apply_aspect()
+        if layer is not None:
+            layer.draw(axes, i)
         _draw_names(axes, plan, i, view, [f for f in findings if f.level == i])
     return figure
 
@@ -187,6 +182,8 @@ def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: S
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
     if plan.start is not None and plan.start.level == level_index:
         _draw_start(axes, plan.start)
+    for row in exit_lines(plan, level_index).tolist():
+        _draw_exit(axes, *row)
     for finding in findings:
         _mark(axes, finding)
     _draw_frame(axes, level, view)
@@ -247,6 +244,13 @@ def _draw_start(axes: Any, start: Pose) -> None:
     """A triangle at the start that points along its heading."""
     marker = (3, 0, math.degrees(start.heading_rad) - 90)
     axes.plot(start.x_m, start.y_m, marker=marker, color=WAY, markersize=9, zorder=6)
+
+
+def _draw_exit(axes: Any, x0: float, y0: float, x1: float, y1: float) -> None:
+    """The sign, in its box on the door, and the line out of it."""
+    axes.plot((x0, x1), (y0, y1), color=WAY_NAME, linewidth=1.5, zorder=6)
+    box = {"boxstyle": "square", "facecolor": WAY_NAME, "edgecolor": "none"}
+    axes.text(x0, y0, "EXIT", size=5, color="white", bbox=box, ha="center", va="center", clip_on=True, zorder=6)
 
 
 def _draw_frame(axes: Any, level: Level, view: View) -> None:
@@ -316,12 +320,4 @@ def _mark(axes: Any, finding: PlanFinding) -> None:
     """A ring at the finding's position, and the lines that are wrong."""
     for x0, y0, x1, y1 in finding.lines_m:
         axes.plot((x0, x1), (y0, y1), color=WRONG, linewidth=2.0, alpha=0.6, zorder=7)
-    axes.plot(
-        *finding.position_m,
-        "o",
-        markersize=11,
-        markerfacecolor="none",
-        markeredgecolor=WRONG,
-        markeredgewidth=1.2,
-        zorder=8,
-    )
+    axes.plot(*finding.position_m, "o", markersize=11, mfc="none", mec=WRONG, mew=1.2, zorder=8)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The lines of a level as architects draw them: walls, windows, doors, stairs, lifts, ramps; each kind has a pattern of its own.
+"""The lines of a level as architects draw them: walls, windows, doors, exits, stairs, lifts, ramps; each kind has a pattern of its own.
 
 In: a `Plan`, a level. Out: segments (n, 4) in metres by kind, and names of stairs, lifts and ramps with their destinations. Owns the measures.
 A plan says neither to which side a door opens nor where flights begin: no leaf's arc and no arrow along the steps is drawn.
@@ -7,6 +7,7 @@ A plan says neither to which side a door opens nor where flights begin: no leaf'
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ import shapely
 
 from echostep.arrays import Floats
 from echostep.plan import Connector, ConnectorKind, Door, Level, Plan, sides
+from echostep_app.plan.places.exits import OUT_M
 
 # All assumed:
 HALF_WINDOW_M = 0.12  # from the glass to each face of its wall
@@ -21,6 +23,7 @@ HALF_JAMB_M = 0.15  # of the tick across the wall at each side of a door
 TREAD_M = 0.3  # between two steps, of a common staircase
 MOST_TREADS = 16  # on one outline; a longer staircase has wider ones, so that they stay apart on a screen
 HEAD_SHARE = 0.15  # of a ramp's length: its arrow heads
+SIGN_M = 1.0  # from the pose outside an exit to its sign
 
 
 def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
@@ -30,8 +33,16 @@ def level_lines(plan: Plan, level: int) -> dict[str, Floats]:
         "wall": np.concatenate((drawn.walls, *(sides(corners) for corners in drawn.obstacles))),
         "window": _windows(drawn.windows),
         **_doors(drawn),
+        "exit": exit_lines(plan, level),
         **{kind: _way_lines(plan, level, kind, pattern) for kind, pattern in PATTERNS.items()},
     }
+
+
+def exit_lines(plan: Plan, level: int) -> Floats:
+    """A line (n, 4) from each exit of a level to where its sign stands outside."""
+    out = [(e.x_m, e.y_m, math.cos(e.heading_rad), math.sin(e.heading_rad)) for e in plan.exits if e.level == level]
+    rows = [(x - OUT_M * c, y - OUT_M * s, x + SIGN_M * c, y + SIGN_M * s) for x, y, c, s in out]
+    return np.array(rows).reshape(-1, 4)
 
 
 def way_names(plan: Plan, level: int) -> list[tuple[str, tuple[float, float]]]:

@@ -21,6 +21,7 @@ from echostep.plan import Door, Level, Plan
 TOUCH_M = 0.01  # walls with a smaller distance touch
 JAMB_M = 0.1  # greatest distance of a door's end from its wall
 BESIDE_M = 0.1  # distance from a door at which the faces on its two sides are looked up
+CLEAR_M = 0.2  # on both sides of a door, no wall runs along it
 SMALLEST_M2 = 0.02  # smaller faces are slivers
 OUTSIDE = -1
 Face = tuple[int, int]  # index of the level, index of the face (or OUTSIDE)
@@ -112,6 +113,14 @@ def beside(door: Door, by_m: float = BESIDE_M) -> tuple[tuple[float, float], tup
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     u, v = (by_m * d / door.width_m for d in (y1 - y0, x0 - x1))
     return (x + u, y + v), (x - u, y - v)
+
+
+def is_walled(door: Door, walls: shapely.STRtree) -> bool:
+    """Whether a wall runs through a door, or along it so near that nobody passes."""
+    line = shapely.LineString((door.line[:2], door.line[2:]))
+    inner = shapely.LineString([line.interpolate(share, normalized=True) for share in (0.2, 0.8)])
+    ways = (inner, shapely.LineString(beside(door, CLEAR_M)))
+    return any(len(walls.query(way, predicate="dwithin", distance=TOUCH_M)) for way in ways)
 
 
 def faces_under(area: BaseGeometry, faces: Faces) -> list[int]:

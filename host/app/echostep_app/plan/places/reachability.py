@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rooms that no door, stairs or lift reaches.
+"""Rooms, and large parts of a level, that no door, stairs or lift reaches.
 
 In: a `Plan` and its faces. Out: `PlanFinding`s. Owns nothing.
 The narrowest opening of a room is found by bisection: the walls are made thicker until the room is closed.
@@ -18,9 +18,10 @@ from shapely.geometry.base import BaseGeometry
 from echostep.arrays import Floats
 from echostep.plan import Level, Plan, Room
 from echostep_app.plan.cropping import within
-from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, connected_groups, door_faces, leader_of
+from echostep_app.plan.places.faces import OUTSIDE, Face, Faces, beside, connected_groups, door_faces, leader_of
 from echostep_app.plan.places.findings import PlanFinding
 
+PART, HOLLOW_M = 0.25, 1.3  # of a level's area, from which it is told; narrower spaces are insides of walls; assumed
 MANY_CLOSED = 5  # from this many rooms without a door on a level, their cause is reported once; assumed
 
 
@@ -29,10 +30,18 @@ def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFindin
 
     Many rooms of one level without any door give one finding on the cause.
     """
-    rooms, home = _groups_of_rooms(plan, faces)
+    leader = connected_groups(plan, faces)
+    rooms, home = _groups_of_rooms(plan, faces, leader)
+    yield from _parts(plan, faces, leader, {group for *_, group in rooms}, home)
     apart = [(i, room, f) for i, room, f, group in rooms if group != home]
+    pairs = [door_faces(level.doors, of) for level, of in zip(plan.levels, faces, strict=True)]
+    if len(pairs) > 1 and any(pairs) and not any(OUTSIDE in pair for level in pairs for pair in level):
+        i = next(i for i, level in enumerate(pairs) if level)  # one level may be a part of a house
+        yield PlanFinding(
+            "no exit", i, beside(plan.levels[i].doors[0])[0], "no door and no gap leads outside: nobody gets out"
+        )
     for i, level in enumerate(plan.levels):
-        with_door = {f for pair in door_faces(level.doors, faces[i]) for f in pair}
+        with_door = {f for pair in pairs[i] for f in pair}
         closed = [room for k, room, f in apart if k == i and f not in with_door]
         many = len(closed) >= MANY_CLOSED
         if many:
@@ -43,21 +52,42 @@ def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFindin
                 yield PlanFinding("unreachable", i, room.at_m, text)
 
 
-def _groups_of_rooms(plan: Plan, faces: Sequence[Faces]) -> tuple[list[tuple[int, Room, int, Face]], Face | None]:
+def _parts(
+    plan: Plan, faces: Sequence[Faces], leader: dict[Face, Face], known: set[Face], home: Face | None
+) -> Iterator[PlanFinding]:
+    """Large parts of levels without a named room that are not connected to `home`, or without any room to the largest part."""
+    sizes: list[Counter[Face]] = [Counter() for _ in faces]
+    middles: dict[Face, Point] = {}
+    joined = {i for connector in plan.connectors for i in connector.levels}
+    for i, level in enumerate(faces):
+        for k, area in enumerate(level.areas if i in joined or len(faces) == 1 else ()):
+            if not area.buffer(-HOLLOW_M / 2).is_empty:
+                sizes[i][leader_of(leader, (i, k))] += area.area
+                middles.setdefault((i, k), area.representative_point())
+    if not known and plan.start is None:
+        home = max(sum(sizes, Counter()).items(), key=lambda row: row[1], default=(None, 0.0))[0]
+    for i, groups in enumerate(sizes):
+        for group, size in groups.items():
+            if home is not None and group not in (home, *known) and size >= PART * groups.total():
+                at = next(at for (j, k), at in middles.items() if j == i and leader_of(leader, (i, k)) == group)
+                text = f"{size:.0f} m2 around here cannot be reached by doors, gaps, stairs or lifts"
+                yield PlanFinding("sealed", i, (at.x, at.y), text)
+
+
+def _groups_of_rooms(
+    plan: Plan, faces: Sequence[Faces], leader: dict[Face, Face]
+) -> tuple[list[tuple[int, Room, int, Face]], Face | None]:
     """Level, room, face and group of connected faces of each enclosed room; and the group of the start, else the one with most rooms.
 
     The group is None when each of many rooms is alone.
     """
-    leader = connected_groups(plan, faces)
     rooms: list[tuple[int, Room, int, Face]] = []
     for i, level in enumerate(plan.levels):
         at = faces[i].indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2)).tolist()
         rooms += [(i, r, f, leader_of(leader, (i, f))) for r, f in zip(level.rooms, at, strict=True) if f != OUTSIDE]
-    if not rooms:
-        return [], None
     counts = Counter(group for *_, group in rooms)
     if plan.start is None:
-        group, count = counts.most_common(1)[0]
+        group, count = counts.most_common(1)[0] if counts else (None, 0)
         return rooms, None if count == 1 and len(rooms) >= MANY_CLOSED else group
     at = faces[plan.start.level].indices_of(np.array([[plan.start.x_m, plan.start.y_m]]))
     return rooms, leader_of(leader, (plan.start.level, int(at[0])))

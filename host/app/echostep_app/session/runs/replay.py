@@ -51,14 +51,8 @@ def replay(
     if note := recording.metadata.get("note"):
         console.print(f"Recording: {note}")
     title = f"echostep replay {shown_name(path, recording.metadata)}"
-    with Session(
-        tracker,
-        title,
-        "simulated" if is_simulated(recording.metadata) else "replay",
-        output,
-        tracking.guide_to,
-        recording,
-    ) as session:
+    is_made = is_simulated(recording.metadata)
+    with Session(tracker, title, "simulated" if is_made else "replay", output, tracking.guide_to, recording) as session:
         session.prepare()
         session.show_truth(truth)
         start_s = time.perf_counter()

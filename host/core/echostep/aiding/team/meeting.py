@@ -74,8 +74,7 @@ def covariance(meeting: Meeting) -> Floats:
     """Covariance (2, 2) of the wearer's place given the meeting (m2): the teammate's with heavier tails, its way since the report, the offset."""
     own = np.array([[meeting.xx_m2, meeting.xy_m2], [meeting.xy_m2, meeting.yy_m2]])
     offset_m2 = (MOVED_M_S * meeting.age_s) ** 2 + (SIDE_SD_M**2 if meeting.range_m is None else 0.0)
-    total: Floats = TAIL**2 * own + offset_m2 * np.eye(2)
-    return total
+    return TAIL**2 * own + offset_m2 * np.eye(2)
 
 
 def start_at(meeting: Meeting) -> CheckIn:

@@ -53,20 +53,17 @@ def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -
         distance = np.hypot(away[:, 0], away[:, 1])
         variance = _range_variance(meeting, away, spread)
         log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
-    log_total: Floats = log_normal + log_level
-    return log_total
+    return log_normal + log_level
 
 
 def information(meeting: Meeting, mean: Floats) -> Floats:
     """Inverse covariance (2, 2) of the wearer's place by the meeting; for a radio range only along the line from the teammate to `mean` (2,)."""
     spread = covariance(meeting)
     if meeting.range_m is None:
-        inverse: Floats = np.asarray(np.linalg.inv(spread), np.float64)
-        return inverse
+        return np.asarray(np.linalg.inv(spread), np.float64)
     away = (mean - [meeting.x_m, meeting.y_m])[None]
     along = _along(away)[0]
-    along_only: Floats = np.outer(along, along) / _range_variance(meeting, away, spread)[0]
-    return along_only
+    return np.outer(along, along) / _range_variance(meeting, away, spread)[0]
 
 
 def best_omega(own: Floats, other: Floats) -> float:
@@ -81,11 +78,10 @@ def best_omega(own: Floats, other: Floats) -> float:
 
 def places_at(cloud: Particles, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
-    place: Floats = np.column_stack([cloud.map_x_m, cloud.y_m])
     c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
     x, y = meeting.way_x_m, meeting.way_y_m
-    place += cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
-    return place
+    way = cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
+    return np.column_stack([cloud.map_x_m, cloud.y_m]) + way
 
 
 def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
@@ -124,22 +120,19 @@ def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floa
         return None
     away = place - mean
     log_prior = np.maximum(-0.5 * np.einsum("ni,ij,nj->n", away, own, away), FARTHEST)
-    log_factor: Floats = (1.0 - omega) * (log_met - log_prior)
-    return log_factor
+    return (1.0 - omega) * (log_met - log_prior)
 
 
 def _along(away: Floats) -> Floats:
     """Unit vectors (n, 2); east without a direction."""
     distance = np.hypot(away[:, 0], away[:, 1])[:, None]
-    unit: Floats = np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
-    return unit
+    return np.where(distance > 0.0, away / np.maximum(distance, 1e-9), [1.0, 0.0])
 
 
 def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     """Variance (n,) of a radio range, with the teammate's own along the line to each place."""
     along = _along(away)
-    variance: Floats = np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
-    return variance
+    return np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
 
 
 def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Charts under the map: ranges, rates and heading over time, with what happened as ticks. In a replay of the whole walk, a tap seeks; live, of the last
-// minute. The values under the pointer are written; the wheel zooms about it, a double click shows all again.
+// minute. The values under the pointer or finger are written; the wheel zooms about it, a double click shows all again.
 
 import { minutes, tr } from '../language.js';
 import { inUnits } from './units.js';
@@ -21,7 +21,7 @@ export class Charts {
   constructor(canvas, colours, onSeek) {
     Object.assign(this, { canvas, colours, onSeek, pen: canvas.getContext('2d'), on: false, rows: [], events: [], play: null, zoomed: null, pointed: null, reading: false, onEvents: () => {}, isWanted: () => false });
     canvas.onclick = ({ offsetX }) => { if (this.play) onSeek(this.time(offsetX)); };
-    canvas.onpointermove = ({ offsetX }) => { this.pointed = offsetX; this.paint(); };
+    canvas.onpointermove = canvas.onpointerdown = ({ offsetX }) => { this.pointed = offsetX; this.paint(); };
     canvas.onpointerleave = () => { this.pointed = null; this.paint(); };
     canvas.ondblclick = () => { this.zoomed = null; this.paint(); };
     canvas.addEventListener('wheel', (e) => this.zoom(e), { passive: false });

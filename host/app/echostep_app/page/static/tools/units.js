@@ -26,12 +26,11 @@ export function inUnits(text) {
   });
 }
 
-// The needle, and a bar of the longest round length of at most 90 px.
+// A bar of the longest round length of at most 90 px.
 export function showScale(view) {
   const unit_m = isFeet ? FOOT_M : 1, longest = 90 / view.scale / unit_m, ten = 10 ** Math.floor(Math.log10(longest));
   const length = [5, 2, 1].find((k) => k * ten <= longest) * ten, inches = Math.round(12 * length * 10) / 10;
   const text = isFeet ? (length < 1 ? `${inches} in` : `${length} ft`) : length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
   $('bar').style.width = `${length * unit_m * view.scale}px`;
   $('bar-text').textContent = text;
-  $('needle').style.transform = `rotate(${-view.tilt}rad)`;
 }

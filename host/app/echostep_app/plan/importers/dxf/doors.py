@@ -36,6 +36,7 @@ SAME_M = 0.25  # two doors with nearer middles are one, as are two lines across 
 NEAR_JAMB_M = 0.02  # closer faces need no end between them
 # Of folding doors: least width, ratio of widths, ratio of panels to their part of the gap; assumed
 THINNEST_PANEL_M, EVEN, FOLDED = (0.1, 1.3, 1.3)
+THROUGH = "a wall was drawn through this door, and cut: is it a door?", "an arc like a door's at a wall: is it a door?"
 Line = tuple[float, float, float, float]
 
 
@@ -43,7 +44,7 @@ Line = tuple[float, float, float, float]
 class PlacedDoors:
     """Doors in walls; `jambs`: ends of the adjacent walls, from face to face; `cuts`: areas of walls that are drawn through the `cut_doors`.
 
-    `strays`: middles of symbols in no wall, and their possible doors.
+    `strays`: middles of symbols in no wall, and their possible doors. `asked`: lines of arcs like swings without a leaf at walls drawn through them.
     `marks`: number of small shapes that are not doors: frames of numbers, jambs.
     """
 
@@ -52,6 +53,7 @@ class PlacedDoors:
     cuts: list[BaseGeometry] = field(default_factory=list)
     cut_doors: list[Line] = field(default_factory=list)
     strays: list[tuple[Point, Line]] = field(default_factory=list)
+    asked: list[Line] = field(default_factory=list)
     marks: int = 0
 
     def add(self, symbol: Symbol, walls: WallBands) -> None:
@@ -69,15 +71,26 @@ class PlacedDoors:
             if walls.gap(line[:2], _along(line), width_m / 2, width_m) is not None:
                 self._place(line, walls)
             elif not self._has(line):
-                self.doors.append(Door(line))
-                self.cuts.append(walls.faces(line, THICKEST_M))
-                self.cut_doors.append(line)
+                self._cut(line, walls)
 
     def add_swing(self, swing: Swing, walls: WallBands) -> Line | None:
-        """Place a swing that lies on no layer of doors, if it fits a gap exactly; returns the gap or None."""
-        line = _exact(swing, walls) or _exact(swing, walls.wider())
-        if line is not None:
+        """Place a swing on no layer of doors, and return its line: in a gap that it fits exactly, or, with a leaf, at a wall drawn through it.
+
+        Without a leaf the latter is asked about.
+        """
+        if (line := _exact(swing, walls) or _exact(swing, walls.wider())) is not None:
             self._place(line, walls)
+            return line
+        closed = [end for k, end in enumerate(swing.ends) if k != swing.leaf and walls.is_at_wall(end)]
+        if len(closed) != 1 or not walls.is_at_wall(swing.hinge):
+            return None
+        line = (*swing.hinge, *closed[0])
+        if walls.gap(line[:2], _along(line), swing.radius_m / 2, swing.radius_m) is not None or self._has(line):
+            return None
+        if swing.leaf is None:
+            self.asked.append(line)
+            return None
+        self._cut(line, walls)
         return line
 
     def add_pair(self, symbol: Symbol, walls: WallBands) -> Line | None:
@@ -92,6 +105,11 @@ class PlacedDoors:
             return None
         self._place(lines[0], walls)
         return lines[0]
+
+    def _cut(self, line: Line, walls: WallBands) -> None:
+        self.doors.append(Door(line))
+        self.cuts.append(walls.faces(line, THICKEST_M))
+        self.cut_doors.append(line)
 
     def _has(self, line: Line) -> bool:
         return any(_same(line, other.line) for other in self.doors)
@@ -119,9 +137,9 @@ class PlacedDoors:
         for at, line in self.strays:
             if math.dist(line[:2], line[2:]) > BY_M:
                 yield Question("door in no wall, left out: is it a door?", "door", at, (line,), is_proposed=True)
-        for line in self.cut_doors:
+        for line in (*self.cut_doors, *self.asked):
             at = (line[0] + line[2]) / 2, (line[1] + line[3]) / 2
-            yield Question("a wall was drawn through this door, and cut: is it a door?", "door", at, (line,))
+            yield Question(THROUGH[line in self.asked], "door", at, (line,), is_proposed=line in self.asked)
 
 
 def _lines(symbol: Symbol, walls: WallBands) -> Iterator[Line]:

@@ -27,14 +27,14 @@ from echostep_app.plan.importers.dxf.doors import PlacedDoors
 from echostep_app.plan.importers.dxf.entities import parts
 from echostep_app.plan.importers.dxf.frame import DrawingFrame
 from echostep_app.plan.importers.dxf.gaps import WallBands
+from echostep_app.plan.importers.dxf.layers import WAYS, matches
 from echostep_app.plan.importers.dxf.rooms import Written, named_spaces, names_of_blocks, rooms_of, written
-from echostep_app.plan.importers.dxf.sheet import Sheet, read_sheet
+from echostep_app.plan.importers.dxf.sheet import Layered, Sheet, read_sheet, storeys_of
 from echostep_app.plan.importers.dxf.storeys import (
     Box,
     alignment,
     beside_house,
     bounds_of,
-    in_order,
     lies_over,
     storey_boxes,
     window_words,
@@ -48,6 +48,7 @@ from echostep_app.plan.importers.dxf.symbols import (
     paired,
     symbol_of,
     symbols_of,
+    with_leaf,
 )
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
@@ -87,8 +88,9 @@ class _Storey:
         return [line for line in self.frame.lines(part, self.sheet.file) if self.holds(line)]
 
     def texts(self) -> list[Written]:
-        """The texts on layers that mean nothing else."""
-        found = (written(entity, layer, self.frame) for entity, layer in self.sheet.others)
+        """The texts among the walls, and on layers that mean nothing else; those of ways out are no names."""
+        pairs = (pair for pair in (*self.sheet.others, *self.sheet.kinds["walls"]) if not matches(pair[1], WAYS))
+        found = (written(entity, layer, self.frame) for entity, layer in pairs)
         return names_of_blocks([text for text in found if text is not None and self.holds(Point(text.room.at_m))])
 
     def holds(self, shape: BaseGeometry) -> bool:
@@ -101,6 +103,8 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     if hints.windows and len(files) > 1:
         raise EchostepError(f"{files[1]}: --window is for one drawing with several storeys: give one file")
     sheets = [read_sheet(file, hints, report) for file in files]
+    if not hints.windows:
+        sheets = [storey for sheet in sheets for storey in storeys_of(sheet, report)]
     report.units = "; ".join(dict.fromkeys(sheet.words for sheet in sheets))
     frame = DrawingFrame.about(sheets[0].walls, sheets[0].scale_m)
     if (frame.x0_m, frame.y0_m) != (0.0, 0.0):
@@ -109,13 +113,16 @@ def import_dxf(files: Sequence[Path], hints: Hints, report: ImportReport) -> Pla
     if hints.windows:
         storeys = [_in_window(storeys[0], window) for window in hints.windows]
     _lay_over(storeys, hints, report)
-    usual = [file.stem for file in files] if len(storeys) == len(files) else [f"level {i}" for i in range(len(storeys))]
+    usual = [
+        f"level {i}" if hints.windows[1:] else one.sheet.storey or one.sheet.file.stem for i, one in enumerate(storeys)
+    ]
     names = [*hints.level_names, *usual[len(hints.level_names) :]]
-    if (order := in_order(names)) != names:
-        report.doubt(f"by their names the storeys are {', '.join(order)[:99]} from the lowest: give them in this order")
+    heights = [one.sheet.height_m for one in storeys]  # known where one drawing has all of them
+    if None in heights or heights.count(0.0) > 1:
+        heights = [k * hints.storey_height_m for k in range(len(storeys))]
     drawn_levels = [
-        _drawn_level(storey, DrawnLevel(name, round(i * hints.storey_height_m, 6)), report)
-        for i, (storey, name) in enumerate(zip(storeys, names, strict=False))
+        _drawn_level(storey, DrawnLevel(name, round(height_m or 0.0, 6)), report)
+        for storey, name, height_m in zip(storeys, names, heights, strict=False)
     ]
     plan = plan_of(files[0].stem, drawn_levels, report)
     return plan if any(level.rooms for level in plan.levels) else _with_names(plan, storeys, report)
@@ -175,9 +182,8 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             dx, dy = alignment(walls[k], walls[0])
             storeys[k] = _moved(storey, dx, dy)
         elif not over:
-            report.doubt(
-                f"{storey.sheet.file.name} does not lie over {first.file.name}: --align lays the storeys over each other"
-            )
+            one, other = (sheet.storey or sheet.file.name for sheet in (storey.sheet, first))
+            report.doubt(f"{one} does not lie over {other}: --align lays the storeys over each other")
 
 
 def _windows(storey: _Storey, boxes: Sequence[Box]) -> str:
@@ -232,8 +238,7 @@ def _without_lines(storey: _Storey, report: ImportReport) -> None:
 def _doors(storey: _Storey, report: ImportReport) -> PlacedDoors:
     """Doors on their layers, then swings on others, or among the walls, that fit a gap exactly."""
     placed = PlacedDoors()
-    kinds = storey.sheet.kinds
-    curves = [p for p in (*storey.sheet.others, *kinds["walls"], *kinds["windows"]) if p[0].dxftype() in CURVES]
+    curves = [pair for pair in _besides_doors(storey) if pair[0].dxftype() in CURVES]
     swings = [(*pair, symbol) for pair in curves if is_swing(symbol := symbol_of(storey.of(pair[0])))]
     storey.swings.update(id(entity) for entity, *_ in swings)  # not walls while doors are looked for
     walls = WallBands(storey.lines("walls", "columns", "windows"))
@@ -263,34 +268,34 @@ def _swings_elsewhere(
     """Place swings on layers that are not of doors, single or in pairs; swings that fit no gap keep their layer's kind."""
     doors: list[tuple[Any, str, Swing, tuple[float, float]]] = []
     left: dict[int, tuple[Any, str, Swing]] = {}  # by id of the line, which the symbols of pairs keep
+    drawn = [(*pair, lines) for pair in _besides_doors(storey) if swings and (lines := storey.of(pair[0]))]
+    tree = shapely.STRtree([lines[0] for *_, lines in drawn])
     for entity, layer, symbol in swings:
-        gap = placed.add_swing(symbol.swings[0], walls)
-        if gap is None:
-            left |= {id(line): (entity, layer, symbol.swings[0]) for line in symbol.lines}
+        near = tree.query(Point(symbol.swings[0].hinge), predicate="dwithin", distance=LEAF_M)
+        swing = with_leaf(symbol.swings[0], [*symbol.lines, *(line for k in near for line in drawn[k][2])])
+        if (gap := placed.add_swing(swing, walls)) is None:
+            left |= {id(line): (entity, layer, swing) for line in symbol.lines}
         else:
-            doors.append((entity, layer, symbol.swings[0], gap[2:]))
+            doors.append((entity, layer, swing, gap[2:]))
     for pair in symbols_of([line for _, _, symbol in swings for line in symbol.lines if id(line) in left]):
         if len(pair.swings) == 2 and placed.add_pair(pair, walls) is not None:
             for entity, layer, swing in (left.pop(id(line)) for line in pair.lines):
                 other = next((one.hinge for one in pair.swings if one.hinge != swing.hinge), swing.hinge)
                 doors.append((entity, layer, swing, other))
     storey.swings.difference_update(id(entity) for entity, _, _ in left.values())
-    for entity, layer, _, _ in doors:
+    for entity, layer, swing, closed in doors:
         report.use("doors", layer)
         report.take_back(f"{entity.dxftype()} on {layer[:40]}")
-    _take_leaves(storey, [(swing, closed) for _, _, swing, closed in doors])
-
-
-def _take_leaves(storey: _Storey, leaves: list[tuple[Swing, tuple[float, float]]]) -> None:
-    """Leaves drawn open at a door's swing count as neither walls nor windows."""
-    kinds = storey.sheet.kinds
-    drawn = [(entity, lines) for entity, _ in (*kinds["walls"], *kinds["windows"]) if (lines := storey.of(entity))]
-    tree = shapely.STRtree([lines[0] for _, lines in drawn]) if leaves else shapely.STRtree([])
-    for swing, closed in leaves:
         for k in tree.query(Point(swing.hinge), predicate="dwithin", distance=LEAF_M):
-            entity, lines = drawn[k]
-            if draws_open_leaf(lines, swing, closed):
-                storey.swings.add(id(entity))
+            other, on, lines = drawn[k]
+            if id(other) not in storey.swings and draws_open_leaf(lines, swing, closed):
+                storey.swings.add(id(other))  # an open leaf is neither wall nor window, nor left out
+                report.take_back(f"{other.dxftype()} on {on[:40]}")
+
+
+def _besides_doors(storey: _Storey) -> Layered:
+    """Entities among which a swing or a leaf may be drawn, on no layer of doors."""
+    return [*storey.sheet.others, *storey.sheet.kinds["walls"], *storey.sheet.kinds["windows"]]
 
 
 def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
@@ -300,6 +305,10 @@ def _tell_doors(placed: PlacedDoors, report: ImportReport) -> None:
     if placed.cuts:
         one = len(placed.cuts) == 1
         report.doubt(f"{len(placed.cuts)} door{' lies' if one else 's lie'} where a wall is drawn through: it was cut")
+    if placed.asked:
+        report.doubt(
+            f"arcs like doors' in walls that are drawn through ({len(placed.asked)}): echostep plan edit asks about each"
+        )
     if placed.strays:
         places = ", ".join(f"x {x:g} y {y:g}" for (x, y), _ in placed.strays[:SHOWN_STRAYS])
         one = len(placed.strays) == 1

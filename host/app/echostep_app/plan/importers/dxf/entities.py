@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,10 @@ def read_drawing(file: Path, report: ImportReport) -> Any:
     from ezdxf.lldxf.const import DXFError
 
     raw = read_bytes(file)
+    if not raw.startswith(BINARY) and b"SECTION" not in raw:
+        raise EchostepError(
+            f"{file}: not a DXF drawing: {'no SECTION in it' if raw.strip() else 'it is empty'}: save it as DXF"
+        )
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # no messages about single values; the audit counts them
     try:
         if raw.startswith(BINARY):
@@ -75,20 +79,23 @@ class VisibleEntities:
                 self._hidden[str(layer.dxf.name).casefold()] = "frozen" if layer.is_frozen() else "off"
         self.references: list[str] = []
 
-    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str]]:
-        """Each entity with its layer; layer "0" inside a block means the block's layer. Blocks are expanded unless `whole(layer)`."""
-        stack: list[tuple[Any, str, int, BaseGeometry | None]]
-        stack = [(entity, "0", 0, None) for entity in reversed(list(self._space))]
+    def __call__(self, whole: Callable[[str], bool]) -> Iterator[tuple[Any, str, Sequence[str]]]:
+        """Each entity with its layer, and the names of the blocks around it, the outermost first; layer "0" inside a block means the block's layer.
+
+        Blocks are expanded unless `whole(layer)`.
+        """
+        stack: list[tuple[Any, str, tuple[str, ...], int, BaseGeometry | None]]
+        stack = [(entity, "0", (), 0, None) for entity in reversed(list(self._space))]
         count = inserts = 0
         while stack:
-            entity, outer, depth, shown = stack.pop()
+            entity, outer, blocks, depth, shown = stack.pop()
             count += depth > 0
             if count > MOST_PARTS:
                 raise EchostepError(f"{self._file}: its blocks have more than {MOST_PARTS} parts")
-            own = _layer_of(entity)
+            own = str(_stated(entity, "layer", "0"))
             layer = outer if own == "0" else own
             is_block = entity.dxftype() == "INSERT"
-            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _is_invisible(entity) else None)
+            hidden = self._hidden.get(layer.casefold()) or ("invisible" if _stated(entity, "invisible", 0) else None)
             if hidden and not (is_block and hidden == "off"):
                 self._report.leave_out(f"{entity.dxftype()} on {layer[:40]} ({hidden})")
                 continue
@@ -96,15 +103,16 @@ class VisibleEntities:
                 inserts += 1
                 for attribute in entity.attribs:
                     attribute.dxf.owner = f"insert {inserts}"  # those of one block name one room; copies have no owner
-                    stack.append((attribute, layer, depth + 1, shown))
+                    stack.append((attribute, layer, blocks, depth + 1, shown))
                 if self._is_reference(entity):
                     continue
                 shown = shown_of(entity, shown)
             for seen in [entity] if shown is None or is_block else clipped(entity, shown):
-                yield seen, layer
+                yield seen, layer, blocks
             if is_block and not whole(layer):
                 inner = parts(entity, self._file) if depth < DEEPEST_BLOCK else []
-                stack += [(part, layer, depth + 1, shown) for part in inner]
+                around = (*blocks, str(entity.dxf.name))
+                stack += [(part, layer, around, depth + 1, shown) for part in inner]
                 if not inner and not entity.attribs:
                     self._report.leave_out(f"INSERT without contents on {layer[:40]}")
 
@@ -120,24 +128,14 @@ class VisibleEntities:
         return True
 
 
-def _layer_of(entity: Any) -> str:
-    """The layer of an entity; "0" for unknown kinds, which ezdxf keeps without attributes."""
+def _stated(entity: Any, name: str, otherwise: Any) -> Any:
+    """An attribute of an entity; `otherwise` for unknown kinds, which ezdxf keeps without attributes."""
     from ezdxf.lldxf.const import DXFError
 
     try:
-        return str(entity.dxf.layer)
+        return entity.dxf.get(name, otherwise)
     except (AttributeError, DXFError):
-        return "0"
-
-
-def _is_invisible(entity: Any) -> bool:
-    """Whether an entity itself is hidden; False for an unknown kind."""
-    from ezdxf.lldxf.const import DXFError
-
-    try:
-        return bool(entity.dxf.get("invisible", 0))
-    except (AttributeError, DXFError):
-        return False
+        return otherwise
 
 
 def parts(insert: Any, file: Path) -> list[Any]:

@@ -52,15 +52,24 @@ class DrawingFrame:
         """A point of the drawing in map metres."""
         return float(point.x) * self.scale_m - self.x0_m, float(point.y) * self.scale_m - self.y0_m
 
+    def heights(self, entity: Any) -> tuple[float, float]:
+        """Lowest and highest z (m) of an entity with its thickness, to a millimetre; 0 without one, or far away."""
+        try:
+            at = entity.dxf.get("insert") if entity.dxf.is_supported("insert") else None
+            ends = [at.z] if at is not None else [p.z for path in paths(entity) for p in path.control_vertices()]
+            tall = float(entity.dxf.get("thickness", 0.0)) if entity.dxf.is_supported("thickness") else 0.0
+        except _broken():
+            return 0.0, 0.0
+        z_m = [round(z * self.scale_m, 3) for end in ends for z in (end, end + tall)]
+        return (min(z_m), max(z_m)) if z_m and all(abs(z) <= LIMIT_M for z in z_m) else (0.0, 0.0)
+
     def raw(self, entity: Any) -> list[LineString]:
         """The entity as polylines in metres, `STRAY` for a line that no building has; empty for an entity without a line."""
-        from ezdxf.lldxf.const import DXFError
-
         try:
             if not abs(float(getattr(entity.dxf, "radius", 0.0))) * self.scale_m <= EARTH_M:
                 return [STRAY]
             lines = [line for path in paths(entity) if (line := self._flat(path)) is not None]
-        except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
+        except _broken():
             return []
         if (width_m := _width(entity) * self.scale_m) > THINNEST_M:
             return _thick(lines, width_m)
@@ -84,6 +93,13 @@ class DrawingFrame:
         return LineString(points) if len(set(points)) > 1 and np.isfinite(points).all() else None
 
 
+def _broken() -> tuple[type[Exception], ...]:
+    """What a damaged entity raises."""
+    from ezdxf.lldxf.const import DXFError
+
+    return TypeError, ValueError, ArithmeticError, LookupError, AttributeError, DXFError
+
+
 def paths(entity: Any) -> Iterator[Any]:
     """The outlines of an entity: one for lines and curves, several for hatches, multilines and polygons; none for texts and pictures."""
     from ezdxf import path
@@ -105,11 +121,9 @@ def paths(entity: Any) -> Iterator[Any]:
 
 def corners(entity: Any) -> list[Floats]:
     """Corners (n, 2) of the entity's outlines in drawing units; curves count as their chords."""
-    from ezdxf.lldxf.const import DXFError
-
     try:
         found = [[(p.start.x, p.start.y), *((c.end.x, c.end.y) for c in p.commands())] for p in paths(entity)]
-    except (TypeError, ValueError, ArithmeticError, IndexError, AttributeError, KeyError, DXFError):
+    except _broken():
         return []
     return [points for row in found if np.isfinite(points := np.array(row, dtype=np.float64)).all() and len(row) > 1]
 

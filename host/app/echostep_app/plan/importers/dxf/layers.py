@@ -16,6 +16,7 @@ from shapely.geometry import LineString
 from echostep.arrays import Floats, Ints
 from echostep_app.plan.importers.straight import pieces_of
 
+OPENINGS = ("*opening*", "*oeffnung*", "*öffnung*", "*ouverture*", "*abertura*", "*apertur*")  # in walls
 # Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Chinese, Japanese, Korean
 LAYERS: dict[str, tuple[str, ...]] = {
     "walls": (
@@ -30,7 +31,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
     ),
     "doors": (
         "*door*", "*tür*", "*tuer*", "*puerta*", "*porte*", "*porta*", "*deur*", "*dør*", "*dörr*", "*drzwi*", "*dveř*", "*двер*", "*门*", "*門*",
-        "*扉*", "*ドア*", "*문*",
+        "*扉*", "*ドア*", "*문*", *OPENINGS,
     ),
     "stairs": (
         "*stair*", "*strs*", "*trepp*", "*escalier*", "*escalera*", "*scala*", "*escada*", "*schod*", "*лестн*", "*楼梯*", "*階段*",
@@ -44,20 +45,12 @@ BESIDE = (
     "*dämm*", "*furn*", "*möbel*", "*moebel*", "*muebl*", "*mobil*", "*sanit*", "*plumb*", "*clng*", "*ceil*", "*elec*", "*hvac*", "*equip*",
     "*tile*", "*-iden*", "*-tag*", "*-symb*", "*-abov*", "*-ovhd*", "*-cntr*", "*-head*", "*achse*", "*tapete*", "*paper*", "*finish*",
 )  # fmt: skip
-# Of ways out, which are drawn like short walls
-EXITS = (
-    "*exit*",
-    "*egress*",
-    "*sortie*",
-    "*salida*",
-    "*saida*",
-    "*uscita*",
-    "*ausgang*",
-    "*uitgang*",
-    "*utgång*",
-    "*выход*",
-    "*出口*",
-)
+# Of ways out and in, which are drawn like short walls
+WAYS = (
+    "*exit*", "*egress*", "*escape*", "*evacu*", "*entrance*", "*entry*", "*sortie*", "*issue*", "*entree*", "*entrée*", "*salida*", "*entrada*",
+    "*saida*", "*saída*", "*uscita*", "*ingresso*", "*ausgang*", "*eingang*", "*flucht*", "*uitgang*", "*ingang*", "*utgång*", "*wyjsc*", "*wyjśc*",
+    "*выход*", "*出口*",
+)  # fmt: skip
 # Kinds whose layers come with layers of hatching or measures
 DRAWN = ("walls", "columns", "windows", "doors", "stairs", "lifts")
 THINNEST_M, THICKEST_M = 0.05, 0.5  # distance of the two faces of a wall; assumed
@@ -79,6 +72,7 @@ def meaning(layer: str, patterns: Mapping[str, Sequence[str]]) -> str | None:
     for kind, names in patterns.items():
         if matches(layer, names):
             usual = names == LAYERS[kind] and kind in DRAWN
+            kind = "doors" if usual and kind == "walls" and matches(layer, OPENINGS) else kind
             return None if usual and matches(layer, BESIDE) else kind
     return None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rooms of a drawing: names where their texts are written, and closed outlines.
+"""Rooms of a drawing: names in the middle of their texts, and closed outlines.
 
 In: entities on the layers of rooms. Out: `Room`s. Owns the least area of an outline.
 """
@@ -27,6 +27,7 @@ from echostep_app.plan.places.spaces import find_spaces
 LEAST_M2 = 1.0  # smaller closed lines are frames of texts, symbols, furniture; assumed
 SAME_HEIGHT = 0.8  # ratio of letters to the largest ones in a room, down to which they belong to its name; assumed
 INDENT, NEXT_LINE = 0.5, 2.5  # of a line from the one above it, in heights of letters; assumed
+LETTER = 0.8  # width of a letter and the gap beside it, of its height, in any font: Arial's are 0.7, those of simplex 0.9; assumed
 MEASURE = re.compile(r"\W*\d[\d.,'x× ]*[.,]\d+\.?$")
 UNIT = r"(?:mm|cm|m|m2|m²|qm|sqm|sq ?ft|sf|['\"])"
 KINDS = r"(?:[AFHUP]|NGF|BGF|[LR]H|[OU]K\w*)"  # areas, perimeters and heights, in English and German
@@ -41,9 +42,13 @@ TEXTS = ("TEXT", "MTEXT", "ATTRIB")
 
 
 class Written(NamedTuple):
-    """A text as a room, height (m) and direction (rad) of its letters, its name in the list of omissions, an attribute's block and tag."""
+    """A text as a room at its middle, the point (map m) that it is aligned about, height (m) and direction (rad) of its letters.
+
+    `what`: its name in the list of omissions; `block`, `tag`: an attribute's.
+    """
 
     room: Room
+    about_m: tuple[float, float]
     height_m: float
     turn: float
     what: str
@@ -52,7 +57,7 @@ class Written(NamedTuple):
 
     def read_at(self) -> tuple[float, float]:
         """Its place along and across the direction of reading."""
-        x, y, c, s = *self.room.at_m, math.cos(self.turn), math.sin(self.turn)
+        x, y, c, s = *self.about_m, math.cos(self.turn), math.sin(self.turn)
         return c * x + s * y, c * y - s * x
 
 
@@ -151,33 +156,45 @@ def _names_of(texts: Sequence[Written], report: ImportReport) -> list[Room]:
     lines = [text for text in words if text.height_m >= largest]
     for line in lines:
         report.take_back(line.what)
-    names: list[list[Written]] = []
-    for line in sorted(lines, key=lambda one: (-one.room.at_m[1], one.room.at_m[0])):
-        above = next((name for name in names if _follows(line, name[-1])), None)
-        if above is None:
-            names.append(above := [])
-        above.append(line)
-    return [Room(" ".join(line.room.name for line in name)[:80], name[0].room.at_m) for name in names]
+    return _stamps(lines, report)
 
 
 def written(entity: Any, layer: str, frame: DrawingFrame) -> Written | None:
-    """A text of any layer; None when the entity is no text."""
-    named = _named(entity, frame)
-    if named is None:
-        return None
-    height = entity.dxf.get("char_height" if entity.dxftype() == "MTEXT" else "height", 0.0)
-    turn = math.radians(entity.get_rotation() if entity.dxftype() == "MTEXT" else entity.dxf.get("rotation", 0.0))
-    block, tag = (entity.dxf.owner, entity.dxf.tag) if entity.dxftype() == "ATTRIB" else ("", "")
-    return Written(named, float(height) * frame.scale_m, turn, f"{entity.dxftype()} on {layer[:40]}", block, tag)
-
-
-def _named(entity: Any, frame: DrawingFrame) -> Room | None:
-    """A text entity as a room; None when it is empty, a size, far away, or not a text."""
-    hidden = entity.dxftype() == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))
-    if hidden or entity.dxftype() not in TEXTS:
+    """A text of any layer; None when it is empty, a size, far away, or not a text."""
+    kind = entity.dxftype()
+    if kind not in TEXTS or (kind == "ATTRIB" and (entity.is_invisible or SIZES.search(entity.dxf.tag))):
         return None
     lines = [line for line in entity.plain_text().replace("\\~", " ").splitlines() if not SIZE.fullmatch(line)]
     words = " ".join(" ".join(lines).split())[:80]
-    at = entity.dxf.insert
-    x, y = frame.metres(at if entity.dxftype() == "MTEXT" else entity.ocs().to_wcs(entity.get_placement()[1] or at))
-    return Room(words, (round(x, 3), round(y, 3))) if words and max(abs(x), abs(y)) < LIMIT_M else None
+    height = float(entity.dxf.get("char_height" if kind == "MTEXT" else "height", 0.0))
+    try:
+        about, middle, turn = _placed(entity, height)
+    except ArithmeticError:  # axes without a direction, sizes beyond all numbers
+        about, middle, turn = entity.dxf.insert, entity.dxf.insert, 0.0
+    x, y = frame.metres(middle)
+    if not words or not max(abs(x), abs(y)) < LIMIT_M:
+        return None
+    named = Room(words, (round(x, 3), round(y, 3)))
+    block, tag = (entity.dxf.owner, entity.dxf.tag) if kind == "ATTRIB" else ("", "")
+    return Written(named, frame.metres(about), height * frame.scale_m, turn, f"{kind} on {layer[:40]}", block, tag)
+
+
+def _placed(entity: Any, height: float) -> tuple[Any, Any, float]:
+    """The point that a text is aligned about and the middle of its extent, in the drawing's units, and its direction (rad)."""
+    from ezdxf.fonts.fonts import MonospaceFont
+    from ezdxf.math import UCS, Vec3
+    from ezdxf.tools.text import estimate_mtext_content_extents, unified_alignment
+
+    dxf, (across, up) = entity.dxf, unified_alignment(entity)
+    if entity.dxftype() == "MTEXT":
+        own, column, font = entity.ucs(), dxf.get("width", 0.0), MonospaceFont(height, LETTER)
+        column = column if column > height else 0.0
+        wide, high = estimate_mtext_content_extents(entity.text, font, column, dxf.get_default("line_spacing_factor"))
+    else:
+        _, about, end = entity.get_placement()
+        wide, high = len(entity.plain_text()) * height * LETTER * dxf.get_default("width"), height
+        ocs, end = entity.ocs(), about if end is None else end
+        line = Vec3.from_deg_angle(dxf.get("rotation", 0.0)) if end.isclose(about) else end - about
+        own = UCS(ocs.to_wcs(about.lerp(end)), ocs.to_wcs(line), uz=dxf.extrusion)
+    middle = own.to_wcs(Vec3((1 - across) * wide / 2, (1, 1, 0, -1, 0)[up] * high / 2))
+    return own.origin, middle, math.atan2(-own.uy.x, own.uy.y)

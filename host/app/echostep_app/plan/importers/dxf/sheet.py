@@ -1,28 +1,44 @@
 # SPDX-License-Identifier: MIT
-"""One drawing file, its entities sorted by the kind of their layers, and its scale.
+"""One drawing file, its entities sorted by the kind of their layers and by the storeys that are drawn over each other, and its scale.
 
-In: a file, hints. Out: `Sheet`. Owns when a drawing is refused for its layers.
+In: a file, hints. Out: `Sheet`s. Owns when a drawing is refused for its layers, and by what its storeys are told apart.
 """
 
 from __future__ import annotations
 
+import math
+import shlex
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+from shapely.geometry import LineString
 
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.dxf.entities import VisibleEntities, read_drawing
 from echostep_app.plan.importers.dxf.frame import METRES, DrawingFrame
-from echostep_app.plan.importers.dxf.layers import BESIDE, EXITS, faces_m, matches, meaning, patterns_of
+from echostep_app.plan.importers.dxf.layers import BESIDE, WAYS, faces_m, matches, meaning, patterns_of
 from echostep_app.plan.importers.dxf.measures import lengths_of
+from echostep_app.plan.importers.dxf.storeys import bounds_of, drawn_over, has_room, window_words
 from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_unit
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.storey_names import StoreyName, storey_of
 
 MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed
 MOST_NAMES = 20  # of layers in an error
+MOST_STOREYS = 200  # over each other
+MOST_COMPARED, SAME = 6, 0.99  # layers of walls; share from which two are the same; assumed
+NAMED = ": another storey? End the names of its layers with _L1, those of the lower one with _L0: each is a level then"
+LEAST_STOREY_M, TOUCH_M = (
+    2.0,
+    0.05,
+)  # of a floor from the one below; of the head of a wall from what stands on it; assumed
 Layered = list[tuple[Any, str]]  # entities with their layers
 
 
@@ -30,7 +46,8 @@ Layered = list[tuple[Any, str]]  # entities with their layers
 class Sheet:
     """`kinds`: entities by the meaning of their layers; `others`: those on layers without one.
 
-    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it.
+    `alike`: other layers that look like walls. `unit`: as the file states it; None if missing, or if hints overrule it. `named`: the storeys that
+    layers or blocks name, by the entities' ids. `storey`: the words for this one, `height_m`: of its walls, where it is one of several.
     """
 
     file: Path
@@ -40,6 +57,9 @@ class Sheet:
     words: str
     unit: str | None
     alike: tuple[str, ...] = ()
+    named: Mapping[int, StoreyName] = field(default_factory=dict)
+    storey: str = ""
+    height_m: float | None = None
 
     @property
     def walls(self) -> list[Any]:
@@ -54,11 +74,14 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     visible = VisibleEntities(drawing, file, report)
     kinds: dict[str, Layered] = {kind: [] for kind in patterns}
     others: Layered = []
-    known: dict[str, str | None] = {}
-    for entity, layer in visible(lambda layer: meaning(layer, patterns) == "doors"):
-        kind = known[layer] if layer in known else known.setdefault(layer, meaning(layer, patterns))
+    known, storey = cache(lambda layer: meaning(layer, patterns)), cache(storey_of)
+    named: dict[int, StoreyName] = {}
+    for entity, layer, blocks in visible(lambda layer: known(layer) == "doors"):
+        kind = known(layer)
         if entity.dxftype() != "INSERT" or kind == "doors":
             (others if kind is None else kinds[kind]).append((entity, layer))
+            own = next((found for name in (layer, *blocks) if (found := storey(name))), None)
+            named |= {} if own is None else {id(entity): own}
     for name in visible.references:
         report.doubt(f"{name} is an external reference, so not in the file: bind it (XREF, Bind) or give that drawing")
     if not kinds["walls"]:
@@ -69,7 +92,7 @@ def read_sheet(file: Path, hints: Hints, report: ImportReport) -> Sheet:
     else:
         scale_m, words = scale_of(drawing, lengths, hints.units, file, report)
         unit = None if hints.units else stated_unit(drawing)
-    sheet = Sheet(file, kinds, others, scale_m, words, unit)
+    sheet = Sheet(file, kinds, others, scale_m, words, unit, (), named)
     return replace(sheet, alike=_tell(sheet, report, asks="walls" not in hints.layers))
 
 
@@ -86,13 +109,14 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
         report.leave_out(what, count)
     frame = DrawingFrame.about(sheet.walls, sheet.scale_m)
     alike = _like_walls(sheet.others, frame)
-    if not alike:
+    used_m = sum(line.length for line in _lines(sheet.walls, frame))
+    over = _over([layer for layer, _ in alike], sheet, frame) if alike else []
+    if over:
+        report.doubt(f"what looks like walls on {over[0]} lies over the walls used{NAMED}")
+    if not (alike := [row for row in alike if row[0] not in over]):
         return ()
-    used_m = sum(line.length for entity in sheet.walls for line in frame.raw(entity))
     words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
-    advice = " ".join(
-        f"--layer walls={_quoted(layer)}" for layer in [*report.layers["walls"], *(name for name, _ in alike)][:6]
-    )
+    advice = _advice([*report.layers["walls"], *(name for name, _ in alike)][:6])
     if asks and sum(length for _, length in alike) > MOST_MORE * used_m:
         raise EchostepError(
             f"{sheet.file}: the layers named as walls have {used_m:.0f} m of lines; more that looks like walls is on {words}: give {advice}, "
@@ -102,16 +126,105 @@ def _tell(sheet: Sheet, report: ImportReport, *, asks: bool) -> tuple[str, ...]:
     return tuple(layer for layer, _ in alike)
 
 
+def storeys_of(sheet: Sheet, report: ImportReport) -> list[Sheet]:
+    """A sheet for each storey that is drawn over another one, the lowest first; they are told. One where none is."""
+    frame, by = DrawingFrame(sheet.scale_m), "names of layers or blocks"
+    names, homes = _named(sheet, frame)
+    if len(names) < 2:
+        by = "heights of walls"
+        names, homes = _lifted(sheet, frame)
+    if len(names) < 2:
+        layers = [layer for layer, _ in Counter(layer for _, layer in sheet.kinds["walls"]).most_common(MOST_COMPARED)]
+        for layer in _over(layers, sheet, frame)[-1:]:
+            report.doubt(f"what is on {layer} lies over the other walls{NAMED}")
+        return [sheet]
+    parts = [_part(sheet, homes, names, number) for number in sorted(names)]
+    lines = [_lines(part.walls, frame) for part in parts]
+    told = f"{sheet.file.name}: by the {by} it has the storeys {', '.join(part.storey for part in parts)[:99]}"
+    if not any(drawn_over(low, high) for low, high in pairwise(lines)):
+        report.doubt(f"{told}, but they do not lie over each other: taken as one level")
+        return [sheet]
+    both = sorted(
+        {layer for row in sheet.kinds.values() for entity, layer in row if homes.get(id(entity)) not in names}
+    )
+    window = window_words([bounds_of([line for row in lines for line in row])], sheet.scale_m)
+    on_all = f"; on all of them: {', '.join(both)[:99]}" if both else ""
+    report.doubt(f"{told}, over each other: each is a level; {window} takes them as one{on_all}")
+    lows = [min(frame.heights(entity)[0] for entity in part.walls) for part in parts]
+    if all(high - low >= LEAST_STOREY_M for low, high in pairwise(lows)):
+        parts = [replace(part, height_m=low - lows[0]) for part, low in zip(parts, lows, strict=True)]
+    return parts
+
+
+def _part(sheet: Sheet, homes: Mapping[int, int], names: Mapping[int, str], number: int) -> Sheet:
+    """What is on one storey, or on none of those that walls are on."""
+    rows = {"": sheet.others, **sheet.kinds}
+    own = {kind: [pair for pair in row if homes.get(id(pair[0])) in (number, None)] for kind, row in rows.items()}
+    return replace(sheet, others=own.pop(""), kinds=own, storey=names[number])
+
+
+def _named(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
+    """Words of the storeys that walls name, by their numbers, and the numbers of entities, by their ids; walls without one may be one more."""
+    homes = {key: storey.number for key, storey in sheet.named.items()}
+    walls = [entity for entity in sheet.walls if id(entity) in homes and frame.raw(entity)]
+    names = {homes[id(entity)]: sheet.named[id(entity)].words for entity in walls}
+    rest = [pair for pair in sheet.kinds["walls"] if id(pair[0]) not in homes]
+    own = _lines([entity for entity, _ in rest if names], frame)
+    if has_room(own) and drawn_over(own, _lines(walls, frame)):
+        lowest = min(0, *names) - 1
+        names[lowest] = rest[0][1]
+        homes |= {id(entity): lowest for entity, _ in rest}
+    return names, {key: number for key, number in homes.items() if number in names}
+
+
+def _lifted(sheet: Sheet, frame: DrawingFrame) -> tuple[dict[int, str], dict[int, int]]:
+    """As `_named`, by the heights of the floors that walls stand on; walls that enclose no room stand on no floor of their own."""
+    bands: list[tuple[float, float]] = []
+    for low, high in sorted({frame.heights(entity) for entity in sheet.walls}):
+        base, top = bands[-1] if bands else (-math.inf, -math.inf)
+        if low < max(top - TOUCH_M, base + LEAST_STOREY_M) or (low == high and base < top and low - top < TOUCH_M):
+            bands[-1] = base, max(top, high)
+        else:
+            bands.append((low, high))
+
+    def home(entity: Any) -> int:
+        return max(bisect_right(bases, frame.heights(entity)[0] + TOUCH_M) - 1, 0)
+
+    bases = [base for base, _ in bands]
+    on: dict[int, list[Any]] = {}
+    for entity in sheet.walls if 1 < len(bases) <= MOST_STOREYS else ():
+        on.setdefault(home(entity), []).append(entity)
+    bases = [base for k, base in enumerate(bases) if has_room(_lines(on.get(k, []), frame))]
+    pairs = [pair for row in (*sheet.kinds.values(), sheet.others) for pair in row if len(bases) > 1]
+    return {k: f"{base:g} m" for k, base in enumerate(bases)}, {id(entity): home(entity) for entity, _ in pairs}
+
+
+def _over(layers: Sequence[str], sheet: Sheet, frame: DrawingFrame) -> list[str]:
+    """Which layers look like another storey over the walls on other layers, though no word names it; the same walls, drawn and filled, are one."""
+    used = {layer for _, layer in sheet.kinds["walls"]}
+    lines: dict[str, list[LineString]] = {layer: [] for layer in (*used, *layers)}
+    for entity, layer in (*sheet.kinds["walls"], *sheet.others) if used - {*layers[:1]} else ():
+        if layer in lines:
+            lines[layer] += frame.raw(entity)
+    found = []
+    for layer in layers:
+        own, rest = lines[layer], [line for other in used - {layer} for line in lines[other]]
+        if storey_of(layer) is None and has_room(own) and has_room(rest) and drawn_over(own, rest, SAME):
+            found.append(layer)
+    return found
+
+
+def _lines(entities: Sequence[Any], frame: DrawingFrame) -> list[LineString]:
+    return [line for entity in entities for line in frame.raw(entity)]
+
+
 def _like_walls(pairs: Layered, frame: DrawingFrame) -> list[tuple[str, float]]:
     """Layers whose lines look like faces of walls, and their length (m), the longest first."""
     by_layer: dict[str, list[Any]] = {}
     for entity, layer in pairs:
-        if not matches(layer, (*BESIDE, *EXITS)):
+        if not matches(layer, (*BESIDE, *WAYS)):
             by_layer.setdefault(layer, []).append(entity)
-    lengths = {
-        layer: faces_m([line for entity in entities for line in frame.raw(entity)])
-        for layer, entities in by_layer.items()
-    }
+    lengths = {layer: faces_m(_lines(entities, frame)) for layer, entities in by_layer.items()}
     return sorted(((layer, length) for layer, length in lengths.items() if length), key=lambda row: -row[1])
 
 
@@ -129,7 +242,8 @@ def _no_walls(
         return EchostepError(
             f"{file}: the drawing only refers to {', '.join(references)[:200]} (external reference): bind it (XREF, Bind), or give that file"
         )
-    if not everything and any(len(drawing.layouts.get(name)) > 1 for name in drawing.layout_names() if name != "Model"):
+    least = max(1, len(everything))
+    if any(len(drawing.layouts.get(name)) > least for name in drawing.layout_names() if name != "Model"):
         return EchostepError(f"{file}: it is on a layout (paper space) alone: copy it to the model space (CHSPACE)")
     names = [layer for layer, _ in Counter(layer for _, layer in everything).most_common(MOST_NAMES)]
     unit = likely_unit(lengths_of({"walls": [entity for entity, _ in everything], "doors": [], "rooms": []}, file))
@@ -137,7 +251,7 @@ def _no_walls(
     columns = " but columns" if kinds["columns"] else ""
     if alike:
         words = ", ".join(f"{layer} ({length:.0f} m)" for layer, length in alike[:4])
-        advice = " ".join(f"--layer walls={_quoted(layer)}" for layer, _ in alike[:4])
+        advice = _advice([layer for layer, _ in alike[:4]])
         return EchostepError(
             f"{file}: no layer has the name of walls{columns}; what looks like walls is on {words}: give {advice}"
         )
@@ -147,5 +261,6 @@ def _no_walls(
     )
 
 
-def _quoted(layer: str) -> str:
-    return f"'{layer}'" if any(letter in layer for letter in " '*?[]()&;|$") else layer
+def _advice(layers: Sequence[str]) -> str:
+    """Options that take layers as walls."""
+    return " ".join(f"--layer walls={shlex.quote(layer)}" for layer in layers)

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Storeys of drawings: several side by side in one drawing, and storeys that do not lie over each other.
+"""Storeys of drawings by their walls: several side by side in one drawing, over each other, or apart.
 
-In: walls of levels. Out: windows of a drawing, the move that lays one level over another, doubts. Owns the test of storeys side by side.
+In: walls of levels. Out: windows of a drawing, the move that lays one level over another. Owns the tests of storeys side by side and over each other.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,44 +20,24 @@ from echostep_app.plan.importers.straight import pieces_of
 APART = 0.05  # least distance between storeys beside each other, as a share of the drawing's size; assumed
 LEAST_APART_M = 2.0
 BORDER_M = 0.6  # a border is further from what it frames: more than a thick wall; assumed
-SHARES = (1.0, 0.5, 0.25)  # of that distance, tried in this order; assumed
+LEAST_SHARE_APART = 0.25  # of that distance: a detail may lie close to a storey; assumed
 LEAST_SHARE = 0.1  # of the longest group of walls: smaller groups are details; assumed
 ALIKE = 0.4  # two storeys of one building differ by less than this share of their size; assumed
 OVER = 0.3  # share of the smaller level's rectangle that lies over the other one's, in one building; assumed
 GRID_M = 0.02  # step of the search for the move that aligns two levels
 MOST_CELLS = 200_000
-GROUND = {"eg", "erdgeschoss", "ground", "gf", "rdc"}
-BELOW = {"kg", "ug", "keller", "kellergeschoss", "untergeschoss", "basement"}
-ABOVE = {"og", "obergeschoss", "stock", "etage", "floor", "storey", "level", "ebene"}
+MOST_STOREYS = 12  # beside each other on one sheet; more are rooms; assumed
+DOOR_M = 1.3  # widest door that a room may have; assumed
+SAME_M, DEEP_M = 0.01, 0.5  # between walls that coincide; so far both walls go on beyond a crossing; assumed
+COINCIDE, CROSSINGS = 0.1, 3  # share of the shorter storey's walls, number; from which two are over each other; assumed
 Box = tuple[float, float, float, float]
 
 
-def in_order(names: Sequence[str]) -> list[str]:
-    """The storeys' names from the lowest; unchanged where one does not name its storey."""
-    told = [_storey(name.casefold()) for name in names]
-    return list(names) if None in told else [name for _, name in sorted(zip(told, names, strict=True))]
-
-
-def _storey(name: str) -> int | None:
-    """The number of a storey by its name; None where it has none, or several."""
-    words, numbers = set(re.findall(r"[^\W\d_]+", name)), [int(digits) for digits in re.findall(r"\d+", name)]
-    if words & (GROUND | BELOW):
-        return -(numbers or [1])[0] if words & BELOW else 0
-    return numbers[0] if len(numbers) == 1 and words & ABOVE else None
-
-
 def storey_boxes(walls: Sequence[LineString]) -> list[Box]:
-    """Rectangles (m) of groups of walls that look like storeys drawn side by side; one rectangle when there is one group.
-
-    A detail close to one storey hides that the storeys are alike: then they are looked for with smaller distances.
-    """
+    """Rectangles (m) of groups of walls that look like storeys drawn side by side; one rectangle when there is one group."""
     lines = np.array(list(walls), dtype=object)
     lines = lines[~_is_border(lines)]
-    nearest = _groups(lines, SHARES[-1])
-    if len(nearest) == 1:  # then it is one group by larger distances, too
-        return _storeys(lines, nearest)
-    tried = (_storeys(lines, nearest if share == SHARES[-1] else _groups(lines, share)) for share in SHARES)
-    return next((found for found in tried if len(found) > 1), _storeys(lines, nearest))
+    return _storeys(lines, _groups(lines, LEAST_SHARE_APART))
 
 
 def beside_house(walls: Sequence[LineString]) -> tuple[int, Box] | None:
@@ -100,8 +79,33 @@ def _storeys(lines: np.ndarray[Any, Any], groups: np.ndarray[Any, Any]) -> list[
     np.add.at(lengths, group, shapely.length(lines)[which])
     large = groups[lengths >= LEAST_SHARE * lengths.max()]
     first = large[np.argmax(shapely.area(large))] if len(large) else None
-    storeys = [g.bounds for g in large if first is not None and _alike(g.bounds, first.bounds)]
-    return sorted((x0, y0, x1, y1) for x0, y0, x1, y1 in storeys)
+    storeys = [g for g in large if first is not None and _alike(g.bounds, first.bounds)]
+    if 1 < len(storeys) <= MOST_STOREYS:
+        storeys = [g for g in storeys if has_room(lines[shapely.intersects(lines, g)])]
+    return sorted(g.bounds for g in storeys) if len(storeys) <= MOST_STOREYS else []
+
+
+def has_room(lines: Sequence[LineString] | np.ndarray[Any, Any]) -> bool:
+    """Whether walls enclose a space, but for doors."""
+    if not len(lines):
+        return False
+    closed = shapely.union_all(shapely.buffer(np.asarray(lines, dtype=object), DOOR_M / 2, quad_segs=2))
+    return any(part.interiors for part in shapely.get_parts(closed))
+
+
+def drawn_over(one: Sequence[LineString], other: Sequence[LineString], most: float = math.inf) -> bool:
+    """Whether walls are those of two storeys over each other: they cross well before their ends, or coincide, by up to the share `most`."""
+    a, b = (shapely.linestrings(pieces_of(lines).reshape(-1, 2, 2)) for lines in (one, other))
+    tree = shapely.STRtree(b)
+    near = np.unique(tree.query(a, predicate="dwithin", distance=SAME_M)[1])
+    bands = shapely.union_all(shapely.buffer(b[near], SAME_M, cap_style="flat"))
+    shared_m = shapely.length(shapely.intersection(shapely.union_all(a), bands))
+    if COINCIDE < shared_m / min(shapely.length(shapely.union_all(walls)) for walls in (a, b)) < most:
+        return True
+    i, j = tree.query(a, predicate="crosses")
+    at = shapely.intersection(a[i], b[j])
+    deep = [shapely.distance(at, shapely.boundary(line)) > DEEP_M for line in (a[i], b[j])]
+    return int((deep[0] & deep[1]).sum()) >= CROSSINGS
 
 
 def _alike(one: Box, other: Box) -> bool:

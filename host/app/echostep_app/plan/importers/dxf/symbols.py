@@ -54,8 +54,7 @@ class Symbol:
 def symbol_of(lines: Sequence[LineString]) -> Symbol:
     """The lines of one block as a symbol."""
     swings = [swing for line in lines for swing in swings_in(line)]
-    straight = [LineString(pair) for line in lines for pair in _straight(line)]
-    return Symbol(tuple(lines), tuple(_with_leaf(swing, straight) for swing in swings))
+    return Symbol(tuple(lines), tuple(with_leaf(swing, lines) for swing in swings))
 
 
 def is_swing(symbol: Symbol) -> bool:
@@ -143,11 +142,12 @@ def _circle(points: Floats) -> Swing | None:
     return Swing(_point((a + middle[0], b + middle[1])), ends, radius)
 
 
-def _with_leaf(swing: Swing, straight: Sequence[LineString]) -> Swing:
+def with_leaf(swing: Swing, lines: Sequence[LineString]) -> Swing:
     """The swing with the end that a drawn leaf, a line from the hinge, reaches.
 
     A threshold may also be drawn to the other end: then no end is chosen.
     """
+    straight = [LineString(pair) for line in lines for pair in _straight(line)]
     reached = [k for k, end in enumerate(swing.ends) if any(_is_leaf(line, swing.hinge, end) for line in straight)]
     return replace(swing, leaf=reached[0]) if len(reached) == 1 else swing
 

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString, Point, Polygon
 
 from echostep.errors import EchostepError
-from echostep.plan import ConnectorKind, Door, Georeference, Plan
+from echostep.plan import ConnectorKind, Door, Georeference, Plan, Question
 from echostep_app.plan.georeference import FAR_M, IN_GRID, EarthTransform
 from echostep_app.plan.importers.connector_shapes import plan_of
-from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
+from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, ring, room
 from echostep_app.plan.importers.ifc.bodies import Shapes, SolidBody
 from echostep_app.plan.importers.ifc.doors import placed_door
 from echostep_app.plan.importers.ifc.map_conversion import map_georeference
@@ -31,6 +31,11 @@ from echostep_app.plan.importers.report import ImportReport
 
 NO_STOREY = "at the height of no storey"
 AT_FACE_M, THICKEST_M = 0.1, 1.0  # of a door from the face of its wall; of a wall; assumed
+FILLED_M, FRAME_M = (
+    2.0,
+    0.3,
+)  # least width of a wall that fills a room; between a door's width and its opening's; assumed
+FAR_DEG = 0.01  # of latitude: a kilometre
 CUT_M = 1.0  # height of the cut above the floor: about the rangers' height
 WALLS = ("IfcWall", "IfcColumn", "IfcCurtainWall", "IfcPlate", "IfcMember")
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
@@ -49,7 +54,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     count = 0
     for body in shapes.bodies(standing(model, SEEN, report), report):
         count += 1
-        if why := _place(drawn_levels, body):
+        if why := _place(drawn_levels, body, report):
             report.leave_out(f"{body.element.is_a()} {why}")
     _doors(model, drawn_levels, shapes, report)
     _tell(model, report)
@@ -66,6 +71,7 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
 def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: ImportReport) -> None:
     """Add each door to the levels that it is open to at the height of the cut."""
     scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+    odd: list[str] = []
     solid: dict[int, list[LineString]] = {}  # doors without an opening, by id of the level
     for element in standing(model, ["IfcDoor"], report):
         door = placed_door(element, shapes, scale_m)
@@ -73,6 +79,9 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
             report.leave_out(f"{element.is_a()} without a shape, an opening or a width")
             report.doubt("doors without a shape were left out: export the model with the geometry of its doors")
             continue
+        width_m = float(element.OverallWidth or 0.0) * scale_m
+        if width_m > 0.0 and abs((drawn_m := math.dist(door.line[:2], door.line[2:])) - width_m) > FRAME_M:
+            odd.append(f"{element.Name or f'#{element.id()}'} {width_m:.2f}/{drawn_m:.2f} m")
         levels = [drawn for drawn in drawn_levels if door.z_m[0] <= drawn.height_m + CUT_M <= door.z_m[1]]
         if not levels:
             report.leave_out(f"{element.is_a()} {NO_STOREY}")
@@ -80,6 +89,10 @@ def _doors(model: Any, drawn_levels: list[DrawnLevel], shapes: Shapes, report: I
             drawn.doors.append(Door(door.line, name=str(element.Name or "")[:80]))
             if not door.fills:
                 solid.setdefault(id(drawn), []).append(LineString([door.line[:2], door.line[2:]]))
+    if odd:
+        report.doubt(
+            f"OverallWidth and opening of {len(odd)} doors differ ({', '.join(odd)[:120]}): the opening is taken"
+        )
     for drawn in drawn_levels:
         _open(drawn, solid.get(id(drawn), []))
 
@@ -106,7 +119,7 @@ def _tell(model: Any, report: ImportReport) -> None:
             report.leave_out(element.is_a())
 
 
-def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
+def _place(drawn_levels: list[DrawnLevel], body: SolidBody, report: ImportReport) -> str:
     """Add an element to the levels that it is on; returns why it is on none, empty when it is on one."""
     kind = next(kind for kind in SEEN if body.element.is_a(kind))
     low, high = body.z_m
@@ -115,13 +128,29 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
         return _place_way(drawn_levels, body, CONNECTOR_KINDS[kind], name)
     levels = [drawn for drawn in drawn_levels if low <= drawn.height_m + CUT_M <= high]
     for drawn in levels:
+        full: list[Polygon] = []
         if kind in WALLS:
-            drawn.walls += body.cut(drawn.height_m + CUT_M)
+            for area in body.cut(drawn.height_m + CUT_M):
+                is_full = kind == "IfcWall" and not area.buffer(-FILLED_M / 2).is_empty
+                (drawn.walls if not is_full else full).append(area)
         elif kind == "IfcWindow":
             drawn.windows.append(body.above())
         else:
             drawn.rooms += [room(name or "room", area) for area in body.cut(drawn.height_m + CUT_M)]
+        drawn.questions += [_of_full_wall(name, area) for area in full]
+        report.leave_out("IfcWall that fills a room", len(full))
     return "" if levels else NO_STOREY
+
+
+def _of_full_wall(name: str, area: Polygon) -> Question:
+    """The question about a wall that fills a room, which was left out."""
+    corners = ring(area)
+    lines = np.concatenate((corners, np.roll(corners, -1, axis=0)), axis=1).tolist()
+    at = area.representative_point()
+    text = f"wall {name!r} fills {area.area:.1f} m2 and was left out: take it in?"
+    return Question(
+        text, "wall", (round(at.x, 3), round(at.y, 3)), tuple((a, b, c, d) for a, b, c, d in lines), is_proposed=True
+    )
 
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:
@@ -155,6 +184,10 @@ def _place_on_earth(model: Any, shapes: Shapes, report: ImportReport) -> Georefe
         report.doubt(IN_GRID.format("the model", x, y))
     georeference = _georeference(model)
     if by_map := map_georeference(model, shapes.origin_m, scale_m, report):
+        if georeference and abs(georeference.latitude_deg - by_map.latitude_deg) > FAR_DEG:
+            report.doubt(
+                "its site's RefLatitude is more than 1 km from its map conversion: the map conversion is taken"
+            )
         return by_map
     if georeference is None or (x, y) == (0.0, 0.0):
         return georeference

@@ -23,6 +23,7 @@ from echostep_app.plan.importers.report import ImportReport
 
 # A storey without walls, doors and rooms nearer than this to another one is its reference level; assumed
 REFERENCE_M = 1.0
+DIFFERENT_M = 0.1  # between two heights of one storey; assumed
 CONTENTS = ("IfcWall", "IfcDoor", "IfcWindow", "IfcSpace", "IfcCurtainWall")
 KINDS = ("PredefinedType", "InteriorOrExteriorSpace", "OperationType")  # the latter two in IFC 2x3
 NO_ROOMS = {"GFA", "EXTERNAL"}  # gross floor area; outside of the house
@@ -62,12 +63,13 @@ def _unpacked(path: Path) -> bytes:
 
 def storeys_of(model: Any, path: Path, report: ImportReport) -> list[Storey]:
     """The model's storeys from the lowest, without reference levels, which are reported."""
-    elevation: Any = import_module("ifcopenshell.util.placement").get_storey_elevation
     try:
         scale_m = float(import_module("ifcopenshell.util.unit").calculate_unit_scale(model))
+        found = model.by_type("IfcBuildingStorey")
+        heights = _heights_m(found, scale_m, report)
         storeys = [
-            Storey(str(s.Name or s.LongName or "storey")[:80], round(float(elevation(s)) * scale_m, 6), _contents(s))
-            for s in model.by_type("IfcBuildingStorey")
+            Storey(str(s.Name or s.LongName or "storey")[:80], round(height_m, 6), _contents(s))
+            for s, height_m in zip(found, heights, strict=True)
         ]
     except Exception as error:
         raise EchostepError(f"{path}: its storeys cannot be read: {' '.join(str(error).split())[:200]}") from error
@@ -76,6 +78,33 @@ def storeys_of(model: Any, path: Path, report: ImportReport) -> list[Storey]:
             f"{path}: {'a storey has no sane height' if storeys else 'no IfcBuildingStorey'}: export the model with its storeys"
         )
     return _without_references(sorted(storeys, key=lambda storey: storey.height_m), report)
+
+
+def _heights_m(storeys: list[Any], scale_m: float, report: ImportReport) -> list[float]:
+    """Heights of storeys by their placement, or by their Elevation from the lowest one on: where these differ, by which more of the contents lie."""
+    util: Any = import_module("ifcopenshell.util.placement")
+    placed = [float(util.get_storey_elevation(storey)) * scale_m for storey in storeys]
+    stated = [float(storey.Elevation) * scale_m for storey in storeys if storey.Elevation is not None]
+    if len(stated) < len(placed) or not placed:
+        return placed
+    shift = min(zip(stated, placed, strict=True))
+    stated = [height - shift[0] + shift[1] for height in stated]
+    if max(abs(one - other) for one, other in zip(placed, stated, strict=True)) < DIFFERENT_M:
+        return placed
+    nearer = 0
+    for storey, one, other in zip(storeys, placed, stated, strict=True):
+        for element in (element for relation in storey.ContainsElements for element in relation.RelatedElements):
+            if element.ObjectPlacement:
+                z_m = float(util.get_local_placement(element.ObjectPlacement)[2][3]) * scale_m
+                nearer += (abs(z_m - other) < abs(z_m - one)) - (abs(z_m - one) < abs(z_m - other))
+    words = ", ".join(
+        f"{s.Name or 'storey'} {one:.2f}/{other:.2f} m" for s, one, other in zip(storeys, placed, stated, strict=True)
+    )
+    taken = "Elevation" if nearer > 0 else "placement"
+    report.doubt(
+        f"storeys' placement and Elevation differ ({words[:150]}): {taken} is taken, as more of their contents lie there"
+    )
+    return stated if nearer > 0 else placed
 
 
 def _without_references(storeys: list[Storey], report: ImportReport) -> list[Storey]:

@@ -32,35 +32,16 @@ from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.straight import pieces_of
 
 OPEN = {
-    "walkway",
-    "walkway.island",
-    "unenclosedarea",
-    "platform",
-    "road",
-    "footbridge",
-    "movingwalkway",
-    "lobby",
-    "waitingroom",
+    "walkway", "walkway.island", "unenclosedarea", "platform", "road", "footbridge", "movingwalkway", "lobby", "waitingroom",
     "terrace",
-}
+}  # fmt: skip
 FILLED = {"structure", "column", "opentobelow", "brick", "concrete", "drywall", "wood", "glass"}
 CONNECTOR_KINDS: dict[str, ConnectorKind] = {
-    "stairs": "stairs",
-    "steps": "stairs",
-    "escalator": "stairs",
-    "elevator": "lift",
-    "ramp": "ramp",
-}
+    "stairs": "stairs", "steps": "stairs", "escalator": "stairs", "elevator": "lift", "ramp": "ramp",
+}  # fmt: skip
 SOLID_FIXTURES = {
-    "wall",
-    "obstruction",
-    "equipment",
-    "desk",
-    "furniture",
-    "baggagecarousel",
-    "waterfeature",
-    "vegetation",
-}
+    "wall", "obstruction", "equipment", "desk", "furniture", "baggagecarousel", "waterfeature", "vegetation",
+}  # fmt: skip
 UNUSED = ("address", "amenity", "anchor", "building", "detail", "footprint", "geofence", "occupant", "section")
 ALONG = 0.9  # cosine of the angle up to which an opening runs along its wall; assumed
 ON_M = 0.2  # greatest distance of an opening from the boundary that it opens; assumed
@@ -126,15 +107,12 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
     levels = sorted(_features(archive, "level", earth), key=_ordinal)
     if not levels:
         raise EchostepError(f"{path}: {_file(archive, 'level')}: it has no levels: export the archive with its levels")
-    drawn_levels = {
-        level.key: DrawnLevel(level.name or f"level {_ordinal(level):g}", round(_ordinal(level) * storey_height_m, 6))
-        for level in levels
-    }
+    drawn_levels = _drawn_levels(levels, storey_height_m, report)
     openings = _by_level(_features(archive, "opening", earth), drawn_levels, report)
     units = _by_level(_features(archive, "unit", earth), drawn_levels, report)
     if not any(units.values()):
         raise EchostepError(f"{path}: {_file(archive, 'unit')}: no units on these levels: export all files again")
-    order = list(drawn_levels)
+    order = list({id(drawn): drawn for drawn in drawn_levels.values()}.values())
     for key, drawn in drawn_levels.items():
         if doors_m is None:
             report.leave_out(
@@ -155,10 +133,35 @@ def _venue(archive: Archive, path: Path, storey_height_m: float, doors_m: float 
                 report.leave_out("fixture or kiosk without an area", not areas([fixture.shape]))
             else:
                 report.leave_out(f"fixture {fixture.category}")
-    numbered = {unit.key: (order.index(key), unit) for key in order for unit in units[key]}
-    _relationships(archive, earth, numbered, list(drawn_levels.values()), report)
+    place = {id(drawn): k for k, drawn in enumerate(order)}
+    numbered = {unit.key: (place[id(drawn)], unit) for key, drawn in drawn_levels.items() for unit in units[key]}
+    _relationships(archive, earth, numbered, order, report)
     name = next((venue.name for venue in _features(archive, "venue", earth)), "") or path.stem
-    return plan_of(name, list(drawn_levels.values()), report, georeference)
+    return plan_of(name, order, report, georeference)
+
+
+def _drawn_levels(levels: list[Feature], storey_height_m: float, report: ImportReport) -> dict[str, DrawnLevel]:
+    """Levels by their ids, the lowest first; those of one ordinal beside each other, as of several buildings, are one."""
+    groups: list[list[Feature]] = []
+    for level in levels:
+        beside = (
+            g
+            for g in groups
+            if _ordinal(g[0]) == _ordinal(level) and not any(level.shape.intersects(one.shape) for one in g)
+        )
+        if (group := next(beside, None)) is None:
+            groups.append(group := [])
+        group.append(level)
+    drawn_levels: dict[str, DrawnLevel] = {}
+    for group in groups:
+        ordinal, names = _ordinal(group[0]), dict.fromkeys(level.name for level in group if level.name)
+        drawn = DrawnLevel(", ".join(names)[:80] or f"level {ordinal:g}", round(ordinal * storey_height_m, 6))
+        drawn_levels |= {level.key: drawn for level in group}
+    if shared := [", ".join(level.name or level.key for level in group) for group in groups if group[1:]]:
+        report.doubt(
+            f"levels of one ordinal beside each other, as of several buildings, are one level: {'; '.join(shared)[:99]}"
+        )
+    return drawn_levels
 
 
 def _file(archive: Archive, kind: str) -> str:

@@ -67,7 +67,7 @@ def import_osm(path: Path, storey_m: float, report: ImportReport) -> Plan:
         raise EchostepError(f"{path}: nodes are further than {LIMIT_M / 1000:.0f} km apart: cut out one building")
     site = OsmSite({level: DrawnLevel(f"level {level:g}", round(level * storey_m, 6)) for level in levels}, levels)
     _without_level(elements, report)
-    _outlines(site, elements)
+    _outlines(site, elements, report)
     _spaces(site, elements)
     _doors(site, elements, report)
     _lifts(site, elements)
@@ -131,13 +131,18 @@ def _origin(elements: Elements, path: Path) -> Georeference:
     return Georeference(float(lon), float(lat))
 
 
-def _outlines(site: OsmSite, elements: Elements) -> None:
+def _outlines(site: OsmSite, elements: Elements, report: ImportReport) -> None:
     """Add the outlines of buildings as walls, on each of their levels."""
     for where, nodes, tags in elements.lines():
         if _is_outline(tags):
             least = tags.get("building:min_level") or tags.get("min_level")
             own = levels_of(tags, where) or [k for k in site.order if _within(k, least, tags.get("max_level"))]
             _wall(site, elements, nodes, own, tags)
+            above, stated = sum(level >= 0 for level in site.order), tags.get("building:levels", "")
+            if re.fullmatch(r"\d{1,3}", stated, re.ASCII) and int(stated) < above:
+                report.doubt(
+                    f"{where}: building:levels={stated}, but indoor elements are on {above} levels from 0 up: these are taken"
+                )
             site.outside |= dict.fromkeys(nodes, own)
 
 

@@ -7,6 +7,7 @@ that separates the grey values best] become walls by their outlines; a picture s
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,8 @@ def import_picture(path: Path, pixel_m: float, report: ImportReport) -> Plan:
         report.leave_out(f"spots and letters up to {SMALL_M:g} m", small)
     report.units = f"{pixel_m:.4g} m a pixel (--scale)"
     report.doubt(TRACED)
-    return plan_of(path.stem, [DrawnLevel(path.stem, 0.0, walls=[*large])], report)
+    plan = plan_of(path.stem, [DrawnLevel(path.stem, 0.0, walls=[*large])], report)
+    return replace(plan, picture=(pixel_m, 0.0, 0.0))
 
 
 def threshold(values: Floats) -> float:

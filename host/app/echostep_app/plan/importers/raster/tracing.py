@@ -39,7 +39,8 @@ def grey(path: Path, transparent: int) -> Floats:
                 raise EchostepError(f"{path}: more than {MOST_PIXELS // 10**6} million pixels: cut it to the building")
             return _grey(ImageOps.exif_transpose(image), transparent)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise EchostepError(f"{path}: not a picture that can be read: {str(error)[:200]}") from error
+        reason = str(error).partition(" <")[0][:200]  # behind it stands an address in memory
+        raise EchostepError(f"{path}: not a picture that can be read: {reason}") from error
 
 
 def _grey(image: Any, ground: int) -> Floats:
