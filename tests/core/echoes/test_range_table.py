@@ -23,7 +23,7 @@ from echostep.echoes.range_table import (
     range_table_of,
 )
 from echostep.localization import Building
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.floor import CELL_M
 
 ROOM = Building(
@@ -37,10 +37,8 @@ ROOM_FOR_TABLE = np.empty(CHANCES * RANGES + 1)
 
 def traced(x_m: float, y_m: float, axis_rad: float) -> tuple[float, float]:
     """The range up to which sources are detected with probability LIKELY (nan: none), and the probability that any is."""
-    distance_m, off_axis_rad, kind = (np.empty(MOST_SOURCES) for _ in range(3))
-    count = echo_sources(
-        x_m, y_m, axis_rad, ROOM.walls.near(np.array([x_m]), np.array([y_m])), distance_m, off_axis_rad, kind
-    )
+    block, distance_m, off_axis_rad, kind = one_receiver()
+    count = echo_sources(x_m, y_m, axis_rad, ROOM.walls.near(np.array([x_m]), np.array([y_m])), block)
     missed = np.cumprod([1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], MODEL) for k in range(count)])
     likely = np.flatnonzero(missed < 1.0 - LIKELY)
     return (float(distance_m[likely[0]]), 1.0 - float(missed[-1])) if len(likely) else (math.nan, 0.0)

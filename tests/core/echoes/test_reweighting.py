@@ -11,26 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.echoes.likelihood import GATE_SD, SURE_COS, EchoSettings, echo_model, planned_density
-from echostep.echoes.reweighting import (
-    CloudModel,
-    EchoMemory,
-    MoveProgress,
-    propagate_and_reweight,
-    reweight_by_ping,
-)
+from echostep.echoes.likelihood import GATE_SD, SURE_COS, EchoSettings, echo_density, echo_model, exponential, logarithm
+from echostep.echoes.reweighting import CloudModel, MoveProgress, propagate_and_reweight
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
-from echostep.particles.kernels import begin_segment, end_segment
-from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, Walls, echo_sources, first_sources
+from echostep.walls.echo_sources import Walls, echo_sources, list_sources, one_receiver, unit_at
+from echostep.walls.source_blocks import set_receiver
 from naive.segment import Particle, follow
 
 MODEL = echo_model(EchoSettings())
 WALL = Walls(np.array([[-20.0, 2.0, 20.0, 2.0]]))
 SPAN_M = MODEL.maximum_m - MODEL.minimum_m
-
-
-def source_list() -> SourceList:
-    return SourceList(np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES))
 
 
 class OnePing(NamedTuple):
@@ -82,15 +72,14 @@ def test_the_kernel_is_the_formula(
     zeros = np.zeros(len(y_m))
     particles = ParticleArrays(zeros.copy(), y_m.copy(), zeros.copy(), np.ones(len(y_m)), zeros.copy())
     expected = [written_out(2.0 - y, h, ping) for y, h in zip(y_m.tolist(), hidden.tolist(), strict=True)]
-    arrays = begin_segment(particles)
     range_1, power_1, *others = (np.array([value]) for value in ping)
     pings = PingBatch(np.ones(1), np.array([0.5 * math.pi]), range_1, power_1, np.zeros(1, np.int64), *others)
-    log_evidence, _, top = reweight_by_ping(
-        particles, arrays, hidden, pings, 0, MODEL, 1.0, WALL.near(zeros, y_m), source_list()
-    )
-    end_segment(particles, arrays, top)
+    move, noise, log_evidence = Move(0.0, 0.0, 0.0, 0.0), np.zeros((5, len(y_m))), np.zeros(1)
+    propagate_and_reweight(
+        particles, move, noise, MoveProgress(1.0, 0), pings, CloudModel(6.0, 0.0, MODEL), WALL.near(zeros, y_m), hidden[None], log_evidence
+    )  # fmt: skip
     likelihood = np.array([each[0] for each in expected])
-    assert log_evidence == pytest.approx(math.log(likelihood.mean()), abs=1e-6)
+    assert log_evidence[0] == pytest.approx(math.log(likelihood.mean()), abs=1e-6)
     assert particles.log_weight == pytest.approx(np.log(likelihood / likelihood.max()), abs=1e-6)
     assert hidden == pytest.approx([each[1] for each in expected], abs=1e-6)
 
@@ -124,7 +113,7 @@ def test_a_segment_is_its_moves_and_pings_one_by_one(seed: int, turn_sd_deg: flo
     wanted = follow(expected, move, noise, pings, ROUGH, ROOMS, cost)
     log_evidence, index = np.zeros(k), Walls(ROOMS).near(arrays.x_m, arrays.y_m, 2.0)
     progress, _, log_passed = propagate_and_reweight(
-        arrays, move, noise, MoveProgress(0.0, 0), pings, CloudModel(cost, 0.0, ROUGH), index, EchoMemory(hidden, log_evidence)
+        arrays, move, noise, MoveProgress(0.0, 0), pings, CloudModel(cost, 0.0, ROUGH), index, hidden, log_evidence
     )  # fmt: skip
     assert progress == MoveProgress(1.0, k)
     assert arrays.x_m == pytest.approx([p.x for p in expected], abs=1e-9)
@@ -139,11 +128,11 @@ def test_a_cloud_that_leaves_the_tables_asks_for_them_before_its_ping() -> None:
     arrays = ParticleArrays(np.array([1.0, 1.0]), np.array([1.0, 2.0]), np.zeros(2), np.ones(2), np.zeros(2))
     one = np.ones(1)
     pings = PingBatch(0.5 * one, one, one, one, np.zeros(1, np.int64), one, 0.1 * one, 0.0 * one, one, one)
-    walls, model, memory = Walls(ROOMS), CloudModel(6.0, 0.0, ROUGH), EchoMemory(np.zeros((2, 2)), np.zeros(1))
+    walls, model, memory = Walls(ROOMS), CloudModel(6.0, 0.0, ROUGH), (np.zeros((2, 2)), np.zeros(1))
     progress = MoveProgress(0.0, 0)
     for expected in (MoveProgress(0.5, 0), MoveProgress(1.0, 1)):
         move, index = Move(4.0, 0.0, 0.0, 0.0), walls.near(arrays.x_m, arrays.y_m)
-        progress, *_ = propagate_and_reweight(arrays, move, np.zeros((5, 2)), progress, pings, model, index, memory)
+        progress, *_ = propagate_and_reweight(arrays, move, np.zeros((5, 2)), progress, pings, model, index, *memory)
         assert progress == expected
     assert arrays.x_m == pytest.approx(5.0)
 
@@ -151,18 +140,23 @@ def test_a_cloud_that_leaves_the_tables_asks_for_them_before_its_ping() -> None:
 @given(st.integers(0, 2**32))
 @settings(max_examples=200, deadline=None)
 def test_sources_that_are_left_out_change_no_density(seed: int) -> None:
-    """`planned_density` ends at a wall that surely answers, and an edge out of reach is not detected."""
+    """The density ends at a wall that surely answers, and an edge out of reach is not detected."""
     rng = np.random.default_rng(seed)
     x, y, axis = rng.uniform(0.1, 8.9), rng.uniform(0.1, 3.9), rng.uniform(-3.0, 3.0)
     index = Walls(ROOMS).near(np.array([x]), np.array([y]))
-    every, first = source_list(), source_list()
-    count = echo_sources(x, y, axis, index, *every)
-    fewer = first_sources(
-        Receiver(x, y, math.cos(axis), math.sin(axis)), axis, index, Limits(MODEL.sure_m, SURE_COS, MODEL.edge_m), first
-    )
+    every, first = one_receiver(), one_receiver()
+    count = echo_sources(x, y, axis, index, every[0])
+    set_receiver(first[0], 0, x, y, math.cos(axis), math.sin(axis))
+    limits = (MODEL.sure_m, SURE_COS, MODEL.edge_m)
+    fewer = list_sources(1, unit_at(x, y, axis, index), index, limits, first[0])
     assert fewer <= count
-    for range_m in (0.0, *rng.uniform(0.2, 6.0, 5), *every.distance_m[:count]):
-        densities = [
-            planned_density(range_m, n, *sources, 0.3, 0.2, MODEL) for n, sources in ((count, every), (fewer, first))
-        ]
+    for range_m in (0.0, *rng.uniform(0.2, 6.0, 5), *every[1][:count]):
+        densities = [echo_density(range_m, n, *sources[1:], MODEL) for n, sources in ((count, every), (fewer, first))]
         assert densities[0] == pytest.approx(densities[1], abs=1e-12)
+
+
+@given(st.floats(-700.0, 700.0), st.floats(1e-300, 1e300))
+def test_exponential_and_logarithm_are_those_of_libm(x: float, y: float) -> None:
+    assert exponential(x) == pytest.approx(math.exp(x), rel=1e-8)
+    assert exponential(-1e9) == exponential(-700.0)
+    assert logarithm(y) == pytest.approx(math.log(y), abs=1e-9)

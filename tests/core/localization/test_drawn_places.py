@@ -12,7 +12,7 @@ import pytest
 
 from echostep.localization import Building, MapFilter, Start, TrackStatus
 from echostep.localization.cloud_estimate import weight_about
-from echostep.localization.drawn_places import DrawnPlaces
+from echostep.localization.particles.start import DrawnPlaces
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Level, Plan, Pose
 from echostep.walls.level_sheet import lay_out_levels

@@ -14,8 +14,7 @@ from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Pose, load_plan
 from echostep.walls.echo_sources import Walls
-from echostep.walls.floor import walkable_floor
-from echostep.walls.indoors import Indoors, indoors
+from echostep.walls.floor import Indoors, indoors, walkable_floor
 from walks import DEMO
 
 # A room of 8 m by 6 m with a door of 1 m in its south wall.

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.walls.echo_sources import CORNER, MOST_SOURCES, WALL, Walls, echo_sources
-from echostep.walls.index import WallIndex, build_index, crosses_wall
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
+from echostep.walls.index import WallIndex, build_index, crosses_wall, crossings
+from echostep.walls.source_blocks import MOST_SOURCES
+from echostep.walls.tile_points import CORNER, WALL
 from naive import walls as naive
 
 Sources = list[tuple[float, float, float]]
@@ -38,8 +40,8 @@ def plans(draw: st.DrawFn) -> tuple[Floats, np.random.Generator]:
 def heard(x: float, y: float, axis_rad: float, walls: Walls | WallIndex) -> Sources:
     """The sources as rows; an index has to have the table."""
     index = walls.near(np.array([x]), np.array([y])) if isinstance(walls, Walls) else walls
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    count = echo_sources(x, y, axis_rad, index, distance_m, off_axis_rad, kind)
+    block, distance_m, off_axis_rad, kind = one_receiver()
+    count = echo_sources(x, y, axis_rad, index, block)
     rows = np.column_stack([distance_m, off_axis_rad, kind])[:count].tolist()
     return [(row[0], row[1], row[2]) for row in rows]
 
@@ -54,10 +56,13 @@ def by_kind(sources: Sources) -> list[tuple[float, float]]:
 def test_crossing_agrees_with_shapely(plan: tuple[Floats, np.random.Generator], log_length: float) -> None:
     walls, rng = plan
     index = build_index(walls)
-    for _ in range(20):
-        a = rng.uniform(-9, 17, 2)
-        b = a + rng.uniform(-1, 1, 2) * 10**log_length
-        assert crosses_wall(a[0], a[1], b[0], b[1], index) == naive.crosses(a[0], a[1], b[0], b[1], walls)
+    for scattered_m in (1.0, 13.0):  # by the walls around all, and one by one
+        a = rng.uniform(-9, 17, 2) + rng.uniform(-1, 1, (20, 2)) * scattered_m
+        moves = np.hstack([a, a + rng.uniform(-1, 1, (20, 2)) * 10**log_length])
+        expected = [naive.crosses(ax, ay, bx, by, walls) for ax, ay, bx, by in moves.tolist()]
+        assert [crosses_wall(ax, ay, bx, by, index) for ax, ay, bx, by in moves.tolist()] == expected
+        from_x, from_y, to_x, to_y = moves.T.copy()
+        assert crossings(from_x, from_y, to_x, to_y, index).tolist() == expected
 
 
 @settings(max_examples=100, deadline=None)

@@ -21,7 +21,7 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.errors import EchostepError
 from echostep.jit import kernel, part
 from echostep.plan import Plan
-from echostep.walls.near_walls import mark_near_walls
+from echostep.walls.floor import mark_near_walls
 from echostep_app.plan.cropping import extent, is_clear
 from echostep_app.plan.places.exits import exits_of
 from echostep_app.plan.polyline import way_m

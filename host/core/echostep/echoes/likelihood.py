@@ -15,6 +15,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from echostep.arrays import Floats
 from echostep.jit import inline_kernel, inline_part, lean_kernel
 from echostep.walls.tile_points import CORNER, EDGE
@@ -161,33 +163,23 @@ def _distance_m(level: float, per_db: float, spreading: float) -> float:
     return low
 
 
-@lean_kernel
-def planned_density(
-    range_m: float,
-    count: int,
-    distance_m: Floats,
-    off_axis_rad: Floats,
-    kind: Floats,
-    stray: float,
-    strays: float,
-    m: EchoModel,
-) -> float:
-    """Density per metre of a range given `count` sources, nearest first, if the view is as planned; range 0: the probability of no echo.
+@inline_part
+def after_source(
+    range_m: float, unheard: float, hit: float, distance_m: float, off_axis_rad: float, kind: float, m: EchoModel
+) -> tuple[float, float]:
+    """Probability that no source so far was detected, and density of the range by these sources, after one more; all before was nearer."""
+    answers = unheard * detection(distance_m, off_axis_rad, kind, m) if unheard >= NEGLIGIBLE_REST else 0.0
+    error, sd = range_m - distance_m, m.sd_m + m.slant_m * off_axis_rad
+    return unheard - answers, hit + (answers * normal(error, sd) if abs(error) < GATE_SD * sd else 0.0)
+
+
+@inline_part
+def planned_density(range_m: float, unheard: float, hit: float, stray: float, strays: float) -> float:
+    """Density per metre of a range after all sources [`after_source`], if the view is as planned; range 0: the probability of no echo.
 
     `stray`: probability of a second reflection where no source is detected; `strays`: its density at this range.
     """
-    unheard, hit = 1.0, 0.0
-    for k in range(count):
-        answers = unheard * detection(distance_m[k], off_axis_rad[k], kind[k], m)
-        unheard -= answers
-        sd = m.sd_m + m.slant_m * off_axis_rad[k]
-        if answers > 0.0 and abs(range_m - distance_m[k]) < GATE_SD * sd:
-            hit += answers * normal(range_m - distance_m[k], sd)
-        if unheard < NEGLIGIBLE_REST:
-            break
-    if range_m <= 0.0:
-        return (1.0 - stray) * unheard
-    return hit + unheard * stray * strays
+    return hit + unheard * stray * strays if range_m > 0.0 else (1.0 - stray) * unheard
 
 
 @inline_part
@@ -203,22 +195,24 @@ def echo_density(
     """Density per metre of a range whose view has no history, as of a hidden view or an outlier where it is not as planned; range 0: of no echo."""
     outlier, strays = outlier_density(range_m, m), 1.0 / (m.maximum_m - m.minimum_m)
     as_planned = (1.0 - m.outlier) * (1.0 - m.hidden)
-    planned = planned_density(range_m, count, distance_m, off_axis_rad, kind, m.stray, strays, m)
+    unheard, hit = 1.0, 0.0
+    for k in range(count):
+        unheard, hit = after_source(range_m, unheard, hit, distance_m[k], off_axis_rad[k], kind[k], m)
+    planned = planned_density(range_m, unheard, hit, m.stray, strays)
     return as_planned * planned + (1.0 - as_planned) * outlier
 
 
 @inline_kernel
 def detection(distance_m: float, off_axis_rad: float, kind: float, m: EchoModel) -> float:
     """Probability that a source is detected: from spreading, absorption, beam, and the weaker echo of a corner or an edge."""
-    if distance_m < 0.5 * m.minimum_m:
-        return 0.0
-    log_d = math.log(distance_m) * DB
+    log_d = logarithm(distance_m) * DB
     margin = m.reach - m.per_db * (log_d + ABSORPTION_DB_M * distance_m) - m.beam * off_axis_rad * off_axis_rad
     if kind == EDGE:
         margin -= m.edge + 0.5 * m.per_db * log_d
     elif kind == CORNER:
         margin -= m.corner
-    return 1.0 / (1.0 + math.exp(-margin)) if margin > LEAST_LOGIT else 0.0
+    is_detected = margin > LEAST_LOGIT and distance_m >= 0.5 * m.minimum_m
+    return 1.0 / (1.0 + exponential(-margin)) if is_detected else 0.0
 
 
 @inline_part
@@ -239,4 +233,34 @@ def likeliest_source(
 def normal(x: float, sd: float) -> float:
     """Normal density about zero."""
     z = x / sd
-    return math.exp(-0.5 * z * z) / (sd * 2.5066282746310002)
+    return exponential(-0.5 * z * z) / (sd * 2.5066282746310002)
+
+
+# Bits of numbers: 1.5 * 2^52, to which a number can be added to round it; sqrt(1/2); 2^52, to which those of an integer can be added
+ROUNDING, HALF_ROOT, WHOLE, BIAS = 1.5 * 2.0**52, 0x3FE6A09E667F3BCD, 0x4330000000000000, 1023
+LN2 = 0.6931471805599453
+
+
+@inline_kernel
+def exponential(x: float) -> float:
+    """e^x up to x = 700, relative error below 1e-8, for x < -700 as there: a Taylor series within half a power of two.
+
+    A call of libm would keep the compiler from computing several particles at once. No step depends on how many those are.
+    """
+    x = max(x, -700.0)
+    t = x / LN2 + ROUNDING
+    r = x - (t - ROUNDING) * LN2
+    series = 1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * (1.0 / 5040.0)))
+    series = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * series)))
+    return series * np.int64((np.float64(t).view(np.int64) + BIAS) << 52).view(np.float64)
+
+
+@inline_kernel
+def logarithm(x: float) -> float:
+    """Natural logarithm of a normal number above 0, error below 1e-9: the series of 2 artanh((m - 1) / (m + 1)) with 1/2 <= m^2 < 2."""
+    bits = np.float64(x).view(np.int64) - HALF_ROOT
+    exponent = np.int64((((bits >> 52) + BIAS) & 0x7FF) | WHOLE).view(np.float64) - (2.0**52 + BIAS)
+    m = np.int64((bits & (2**52 - 1)) + HALF_ROOT).view(np.float64)
+    s = (m - 1.0) / (m + 1.0)
+    s2 = s * s
+    return exponent * LN2 + 2.0 * s * (1.0 + s2 * (1.0 / 3.0 + s2 * (0.2 + s2 * (1.0 / 7.0 + s2 * (1.0 / 9.0)))))

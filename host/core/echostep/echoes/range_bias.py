@@ -24,7 +24,7 @@ from echostep.echoes.likelihood import EchoModel, likeliest_source, normal
 from echostep.jit import kernel
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.index import WallIndex
 
 # Share of the variance of a range's error that stays with the ranger, assumed; without a bias `hall` of `evaluate anywhere` fails
@@ -82,13 +82,13 @@ def learn_bias(
     walls: WallIndex, model: EchoModel,
 ) -> tuple[float, float]:  # fmt: skip
     """Mean and variance of the bias after the echoes, whose ranges are without the mean before."""
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    block, distance_m, off_axis_rad, kind = one_receiver()
     mean_m, var_m2 = bias
     before_m = mean_m
     for i in range(len(x)):
         if pings.range_m[i] <= 0.0:
             continue
-        count = echo_sources(x[i], y[i], axis[i], walls, distance_m, off_axis_rad, kind)
+        count = echo_sources(x[i], y[i], axis[i], walls, block)
         first, answers, _ = likeliest_source(count, distance_m, off_axis_rad, kind, model)
         if answers <= 0.0:
             continue

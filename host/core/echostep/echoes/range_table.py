@@ -20,7 +20,7 @@ from echostep.arrays import Floats, Int32s
 from echostep.echoes.likelihood import EchoModel, EchoSettings, detection
 from echostep.jit import kernel, lean_kernel
 from echostep.particles.arrays import PingBatch
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.floor import CELL_M, Floor
 from echostep.walls.index import WallIndex
 
@@ -118,12 +118,12 @@ def _expected(
     x: Floats, y: Floats, walls: WallIndex, model: EchoModel
 ) -> np.ndarray[tuple[int, int], np.dtype[np.uint16]]:
     """The entries by cell and sector: the range up to which sources are detected with probability LIKELY, and the probability that any is."""
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    block, distance_m, off_axis_rad, kind = one_receiver()
     expected = np.zeros((len(x), SECTORS), np.uint16)
     for i in range(len(x)):
         for s in range(SECTORS):
             axis = 2.0 * math.pi * (s + 0.5) / SECTORS
-            count = echo_sources(x[i], y[i], axis, walls, distance_m, off_axis_rad, kind)
+            count = echo_sources(x[i], y[i], axis, walls, block)
             missed, entry = 1.0, 0
             for k in range(count):
                 missed *= 1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], model)

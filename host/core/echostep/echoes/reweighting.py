@@ -12,32 +12,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats
-from echostep.echoes.likelihood import SURE_COS, EchoModel, outlier_density, planned_density
-from echostep.jit import kernel, lean_kernel
-from echostep.particles.arrays import Move, ParticleArrays, PingBatch
-from echostep.particles.kernels import (
-    SegmentArrays,
-    begin_segment,
-    effective_size,
-    end_segment,
-    piece_of,
-    propagate,
+from echostep.arrays import Floats, Ints
+from echostep.echoes.likelihood import (
+    SURE_COS,
+    EchoModel,
+    after_source,
+    exponential,
+    logarithm,
+    outlier_density,
+    planned_density,
 )
-from echostep.walls.echo_sources import MOST_SOURCES, Limits, Receiver, SourceList, are_tabulated, first_sources
+from echostep.jit import inline_part, kernel, lean_kernel, lean_part
+from echostep.particles.arrays import Move, ParticleArrays, PingBatch
+from echostep.particles.kernels import SegmentArrays, begin_segment, end_segment, piece_of, propagate, weight_sums
+from echostep.walls.echo_sources import are_tabulated, list_sources, unit_at
 from echostep.walls.index import WallIndex
+from echostep.walls.source_blocks import BLOCK, DISTANCE, FREE, KIND, OFF_AXIS, new_block, set_receiver
 
 # Of the greatest, below which no likelihood is computed: the next resampling drops such particles
 NEGLIGIBLE_WEIGHT = 1e-9
 LEAST_TOP = 1e-100  # greatest weight below which all are rescaled: far from the least number
+CROWDS, SPREAD = (
+    64,
+    11,
+)  # places for particles of one unit that wait, shared by units; a factor that gives neighbouring tiles different ones
+HIDDEN, UNHEARD, HIT, LIKELIHOOD = range(FREE, FREE + 4 * BLOCK, BLOCK)  # more columns of a block
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
-
-
-class EchoMemory(NamedTuple):
-    """`hidden` (2, n): probability by ranger and particle that its view is hidden. `log_evidence` (k,): output, see `propagate_and_reweight`."""
-
-    hidden: Floats
-    log_evidence: Floats
 
 
 class CloudModel(NamedTuple):
@@ -58,85 +58,119 @@ class MoveProgress(NamedTuple):
 @kernel
 def propagate_and_reweight(
     particles: ParticleArrays, move: Move, noise: Floats, progress: MoveProgress, pings: PingBatch,
-    model: CloudModel, walls: WallIndex, memory: EchoMemory,
+    model: CloudModel, walls: WallIndex, hidden: Floats, log_evidence: Floats,
 ) -> tuple[MoveProgress, float, float]:  # fmt: skip
     """Continue from `progress` until the cloud needs to be resampled or a table (`Walls.near`), or the move is over; `noise` (5, n) is for its rest.
 
-    Writes to `memory.log_evidence` (k,) the log of each ping's mean likelihood under the cloud before it. Returns the new progress, the lowest
-    log of the share that a piece of the move left of the greatest weight, and the log of the weight that the walls left.
+    `hidden` (2, n): probability by ranger and particle that its view is hidden, changed in place. Writes to `log_evidence` (k,) the log of each
+    ping's mean likelihood under the cloud before it. Returns the new progress, the lowest log of the share that a piece of the move left of the
+    greatest weight, and the log of the weight that the walls left.
     """
-    sources = SourceList(np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES))
+    crowds, block = no_crowds(), new_block()
     arrays, wall_factor = begin_segment(particles), math.exp(-model.wall_cost)
     done, k = progress.share, progress.ping
-    rest, top, lowest, passed = 1.0 - done, 1.0, 1.0, 0.0
+    rest, lowest, passed = 1.0 - done, 1.0, 0.0
+    total, squares, top = weight_sums(arrays.weight)
     while done < 1.0 or k < len(pings.share):
         until = max(pings.share[k], done) if k < len(pings.share) else 1.0
         if until > done:
-            piece, before = piece_of(move, done, until), top
-            top, left = propagate(particles, arrays, piece, (until - done) / rest, noise, wall_factor, walls)
-            lowest = min(lowest, top / before)
-            passed += math.log(max(left, wall_factor))
+            piece, before, top_before = piece_of(move, done, until), total, top
+            if propagate(particles, arrays, piece, (until - done) / rest, noise, wall_factor, walls):
+                total, squares, top = weight_sums(arrays.weight)
+                lowest = min(lowest, top / top_before)
+                crossed = (1.0 - total / before) / max(1.0 - wall_factor, LEAST_DENSITY)
+                passed += math.log(max(1.0 - crossed, wall_factor))
             done = until
         if k < len(pings.share):
             if not are_tabulated(particles.x_m, particles.y_m, walls):
                 break
-            memory.log_evidence[k], size, top = reweight_by_ping(
-                particles, arrays, memory.hidden[pings.ranger[k]], pings, k, model.echo, top, walls, sources
-            )
+            before, of_ranger = total, hidden[pings.ranger[k]]
+            reweight_by_ping(particles, arrays, of_ranger, pings, k, model.echo, top, walls, crowds, block)
+            total, squares, top = weight_sums(arrays.weight)
+            log_evidence[k] = math.log(total / before)
             k += 1
-        else:
-            size = effective_size(arrays.weight)
+        size = total * total / squares
         if top < LEAST_TOP:
             for i in range(len(arrays.weight)):
                 arrays.weight[i] /= top
-            top = 1.0
+            total, top = total / top, 1.0
         if size < model.resample_below * len(particles.x_m):
             break
-    end_segment(particles, arrays, top)
+    end_segment(particles, arrays.weight)
     return MoveProgress(done, k), math.log(lowest), passed
+
+
+@kernel
+def no_crowds() -> Ints:
+    """Room for the particles that wait until BLOCK of one unit are together (CROWDS, 2 + BLOCK): the unit, their number, their indices."""
+    return np.zeros((CROWDS, 2 + BLOCK), np.int64)
 
 
 @lean_kernel
 def reweight_by_ping(
     particles: ParticleArrays, arrays: SegmentArrays, hidden: Floats, pings: PingBatch, k: int, model: EchoModel, top: float,
-    walls: WallIndex, sources: SourceList,
-) -> tuple[float, float, float]:  # fmt: skip
+    walls: WallIndex, crowds: Ints, block: Floats,
+) -> None:  # fmt: skip
     """Multiply each particle's weight by its likelihood of the k-th ping; `top`: the greatest weight before.
 
     `hidden` (n,): of this ranger, the probability that the particle's view is hidden, so that the plan gives no information. Along the path it
     returns to `model.hidden` within `model.hidden_m`; the ping corrects it. Densities of ranges are raised to the ping's power, for successive errors
-    are alike; probabilities of the view and of an outlier are not. Returns the log of the mean likelihood before, the effective size after, and the
-    greatest weight after.
+    are alike; probabilities of the view and of an outlier are not.
     """
-    x, y, turn, _, _ = particles
-    weight, cos, sin = arrays
-    distance_m, off_axis_rad, kind = sources
-    axis_rad, range_m, power = pings.axis_rad[k], pings.range_m[k], pings.power[k]
-    stray, missed, unplanned = pings.stray[k], pings.missed[k], pings.unplanned[k]
-    ax, ay = math.cos(axis_rad), math.sin(axis_rad)
+    for i in range(len(arrays.weight)):
+        if arrays.weight[i] < NEGLIGIBLE_WEIGHT * top:
+            continue
+        unit = unit_at(particles.x_m[i], particles.y_m[i], pings.axis_rad[k] + particles.turn_rad[i], walls)
+        crowd = crowds[(unit * SPREAD) % CROWDS]
+        if crowd[1] == BLOCK or (crowd[1] > 0 and crowd[0] != unit):
+            _reweight_crowd(particles, arrays, hidden, pings, k, model, walls, crowd, block)
+        crowd[0], crowd[1] = unit, crowd[1] + 1
+        crowd[1 + crowd[1]] = i
+    for slot in range(CROWDS):
+        if crowds[slot, 1] > 0:
+            _reweight_crowd(particles, arrays, hidden, pings, k, model, walls, crowds[slot], block)
+
+
+@lean_part
+def _reweight_crowd(
+    particles: ParticleArrays, arrays: SegmentArrays, hidden: Floats, pings: PingBatch, k: int, model: EchoModel,
+    walls: WallIndex, crowd: Ints, block: Floats,
+) -> None:  # fmt: skip
+    """Reweight the particles of a crowd, and empty it."""
+    unit, count, members = crowd[0], crowd[1], crowd[2:]
+    crowd[1] = 0
+    ax, ay = math.cos(pings.axis_rad[k]), math.sin(pings.axis_rad[k])
+    for i in range(count):
+        p = members[i]
+        c, s, block[HIDDEN + i] = arrays.cos[p], arrays.sin[p], hidden[p]
+        set_receiver(block, i, particles.x_m[p], particles.y_m[p], ax * c - ay * s, ax * s + ay * c)
+    longest = list_sources(count, unit, walls, (model.sure_m, SURE_COS, model.edge_m), block)
+    _weigh(count, longest, pings, k, model, block)
+    for i in range(count):
+        arrays.weight[members[i]] *= block[LIKELIHOOD + i]
+        hidden[members[i]] = block[HIDDEN + i]
+
+
+@inline_part
+def _weigh(count: int, longest: int, pings: PingBatch, k: int, model: EchoModel, block: Floats) -> None:
+    """Likelihood of the k-th ping for each receiver of a block, and the probability that its view is hidden."""
+    range_m, power, stray = pings.range_m[k], pings.power[k], pings.stray[k]
+    missed, unplanned = pings.missed[k], pings.unplanned[k]
     persists = math.exp(-pings.travel_m[k] / model.hidden_m)
     outlier = model.outlier * (outlier_density(range_m, model) + missed) ** power
     strays = 0.5 * (pings.alike[k] + 1.0 / (model.maximum_m - model.minimum_m))
-    limits = Limits(model.sure_m, SURE_COS, model.edge_m)
-    least, best = NEGLIGIBLE_WEIGHT * top, 0.0
-    total_before, total, squares = 0.0, 0.0, 0.0
-    for i in range(len(x)):
-        w = weight[i]
-        if w < least:
-            continue
-        receiver = Receiver(x[i], y[i], ax * cos[i] - ay * sin[i], ax * sin[i] + ay * cos[i])
-        count = first_sources(receiver, axis_rad + turn[i], walls, limits, sources)
-        density = planned_density(range_m, count, distance_m, off_axis_rad, kind, stray, strays, model)
-        density += missed
-        planned = (1.0 - model.outlier) * math.exp(power * math.log(max(density, LEAST_DENSITY))) + outlier
-        before = model.hidden + persists * (hidden[i] - model.hidden)
+    for i in range(count):
+        block[UNHEARD + i], block[HIT + i] = 1.0, 0.0
+    for source in range(longest):
+        for i in range(count):
+            at = source * BLOCK + i
+            block[UNHEARD + i], block[HIT + i] = after_source(
+                range_m, block[UNHEARD + i], block[HIT + i], block[DISTANCE + at], block[OFF_AXIS + at], block[KIND + at], model
+            )  # fmt: skip
+    for i in range(count):
+        density = planned_density(range_m, block[UNHEARD + i], block[HIT + i], stray, strays) + missed
+        planned = (1.0 - model.outlier) * exponential(power * logarithm(max(density, LEAST_DENSITY))) + outlier
+        before = model.hidden + persists * (block[HIDDEN + i] - model.hidden)
         by_hidden = before * unplanned
-        likelihood = by_hidden + (1.0 - before) * planned
-        hidden[i] = by_hidden / likelihood
-        total_before += w
-        w *= likelihood
-        weight[i] = w
-        best = max(best, w)
-        total += w
-        squares += w * w
-    return math.log(total / total_before), total * total / squares, best
+        block[LIKELIHOOD + i] = by_hidden + (1.0 - before) * planned
+        block[HIDDEN + i] = by_hidden / block[LIKELIHOOD + i]

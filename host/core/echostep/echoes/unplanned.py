@@ -33,7 +33,7 @@ from echostep.echoes.likelihood import (
 from echostep.jit import kernel
 from echostep.particles.arrays import PingBatch
 from echostep.path import MeasuredSegment, Odometer
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.floor import Floor
 from echostep.walls.index import CONE_RAD, WallIndex
 from echostep.walls.tile_points import WALL
@@ -219,10 +219,10 @@ class RangeMemory:
 @kernel
 def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: EchoModel, bins: int) -> Floats:
     """Mean over the poses of the density in the middle of each bin, and of the probability of no echo."""
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    block, distance_m, off_axis_rad, kind = one_receiver()
     mean = np.zeros(bins + 1)
     for i in range(len(x)):
-        count = echo_sources(x[i], y[i], axis[i], walls, distance_m, off_axis_rad, kind)
+        count = echo_sources(x[i], y[i], axis[i], walls, block)
         for k in range(bins):
             mean[k] += echo_density((k + 0.5) * BIN_M, count, distance_m, off_axis_rad, kind, model)
         mean[bins] += echo_density(0.0, count, distance_m, off_axis_rad, kind, model)

@@ -22,8 +22,7 @@ from echostep.arrays import Floats
 from echostep.jit import kernel, lean_kernel, part
 from echostep.particles.arrays import Move, ParticleArrays
 from echostep.particles.limits import HALF_STOREY_M, THREE_SD2
-from echostep.walls.floor import Floor
-from echostep.walls.indoors import inside_grid
+from echostep.walls.floor import Floor, inside_grid
 from echostep.walls.level_sheet import (
     LIFT,
     LevelSheet,

@@ -14,12 +14,11 @@ from echostep.echoes.range_table import range_table_of
 from echostep.echoes.unplanned import Background, background
 from echostep.height.levels import UpperLevels
 from echostep.localization.cloud_estimate import Moments
-from echostep.localization.drawn_places import DrawnPlaces
 from echostep.localization.grid.cells import GridCells, grid_cells
+from echostep.localization.particles.start import DrawnPlaces
 from echostep.plan import Plan
 from echostep.walls.echo_sources import Walls
-from echostep.walls.floor import Floor, walkable_floor
-from echostep.walls.indoors import indoors
+from echostep.walls.floor import Floor, indoors, walkable_floor
 from echostep.walls.level_sheet import LaidOutPlan, LevelSheet, level_of
 
 

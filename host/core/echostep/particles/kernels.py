@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.jit import inline_part, kernel, lean_kernel
+from echostep.jit import kernel, lean_kernel, lean_part
 from echostep.particles.arrays import Move, ParticleArrays
-from echostep.walls.index import WallIndex, crosses_wall
+from echostep.walls.index import WallIndex, crossings
 
 LEAST_WEIGHT = 1e-300  # of a particle, so that its logarithm exists
-SMALL_RAD = 0.05  # rotation up to which the series of `rotated` are exact to 1e-12
+SMALL_RAD = 0.05  # rotation up to which the series of `_rotate` are exact to 1e-12
 NOISE_TURN, NOISE_SCALE, NOISE_BEND = 2, 3, 4  # rows of the noise (5, n); rows 0 and 1 are x and y
 
 
@@ -48,10 +48,11 @@ def begin_segment(particles: ParticleArrays) -> SegmentArrays:
 
 
 @lean_kernel
-def end_segment(particles: ParticleArrays, arrays: SegmentArrays, top: float) -> None:
-    """Write the log-weights, 0 where the weight is `top`, the greatest."""
-    for i in range(len(arrays.weight)):
-        particles.log_weight[i] = math.log(max(arrays.weight[i] / top, LEAST_WEIGHT))
+def end_segment(particles: ParticleArrays, weight: Floats) -> None:
+    """Write the log-weights, 0 for the greatest."""
+    _, _, top = weight_sums(weight)
+    for i in range(len(weight)):
+        particles.log_weight[i] = math.log(max(weight[i] / top, LEAST_WEIGHT))
 
 
 @kernel
@@ -62,54 +63,67 @@ def piece_of(move: Move, begin: float, end: float) -> MovePiece:
     return MovePiece(part * move.dx_m + bend_x, part * move.dy_m + bend_y, bend_x, bend_y)
 
 
-@lean_kernel
+@kernel
 def propagate(
     particles: ParticleArrays, arrays: SegmentArrays, piece: MovePiece, share: float, noise: Floats, wall_factor: float,
     walls: WallIndex,
-) -> tuple[float, float]:  # fmt: skip
+) -> int:  # fmt: skip
     """Move every particle by a piece, with this share of its noise (5, n) but all of its bend's; one that crosses a wall keeps `wall_factor`.
 
-    Returns the greatest weight afterwards, and the share of the weight that crossed no wall.
+    Returns the number of those.
     """
     x, y, turn, scale, _ = particles
-    weight, cos, sin = arrays
-    top, total, crossed = 0.0, 0.0, 0.0
+    to_x, to_y = np.empty(len(x)), np.empty(len(x))
+    _rotate(turn, arrays, share, noise[NOISE_TURN])
     for i in range(len(x)):
-        by_rad = share * noise[NOISE_TURN, i]
-        turn[i] += by_rad
         scale[i] += share * noise[NOISE_SCALE, i]
         dx, dy = piece.dx_m + noise[NOISE_BEND, i] * piece.bend_x_m, piece.dy_m + noise[NOISE_BEND, i] * piece.bend_y_m
-        c, s = rotated(cos[i], sin[i], by_rad, turn[i])
-        to_x = x[i] + scale[i] * (c * dx - s * dy) + share * noise[0, i]
-        to_y = y[i] + scale[i] * (s * dx + c * dy) + share * noise[1, i]
-        total += weight[i]
-        if crosses_wall(x[i], y[i], to_x, to_y, walls):
-            crossed += weight[i]
-            weight[i] *= wall_factor
-        top = max(top, weight[i])
-        x[i], y[i], cos[i], sin[i] = to_x, to_y, c, s
-    return top, 1.0 - crossed / total
+        to_x[i] = x[i] + scale[i] * (arrays.cos[i] * dx - arrays.sin[i] * dy) + share * noise[0, i]
+        to_y[i] = y[i] + scale[i] * (arrays.sin[i] * dx + arrays.cos[i] * dy) + share * noise[1, i]
+    crosses = crossings(x, y, to_x, to_y, walls)
+    crossed = 0
+    for i in range(len(x)):
+        x[i], y[i] = to_x[i], to_y[i]
+        arrays.weight[i] *= wall_factor if crosses[i] else 1.0
+        crossed += crosses[i]
+    return crossed
 
 
-@inline_part
-def rotated(c: float, s: float, by_rad: float, to_rad: float) -> tuple[float, float]:
-    """Cosine and sine of `to_rad` from the values before a turn by `by_rad`: to 1e-12 by series, exactly for a large turn."""
-    if abs(by_rad) > SMALL_RAD:
-        return math.cos(to_rad), math.sin(to_rad)
-    b2 = by_rad * by_rad
-    cb = 1.0 - b2 * (0.5 - b2 * (1.0 / 24.0 - b2 / 720.0))
-    sb = by_rad * (1.0 - b2 * (1.0 / 6.0 - b2 * (1.0 / 120.0)))
-    return c * cb - s * sb, s * cb + c * sb
+@lean_part
+def _rotate(turn: Floats, arrays: SegmentArrays, share: float, noise: Floats) -> None:
+    """Turn every particle by this share of its noise (n,): cosine and sine to 1e-12 by series, exactly if one turns far."""
+    cos, sin, far = arrays.cos, arrays.sin, 0
+    for i in range(len(turn)):
+        turn[i] += share * noise[i]
+        far += abs(share * noise[i]) > SMALL_RAD
+    if far:
+        for i in range(len(turn)):
+            cos[i], sin[i] = math.cos(turn[i]), math.sin(turn[i])
+        return
+    for i in range(len(turn)):
+        by, c, s = share * noise[i], cos[i], sin[i]
+        b2 = by * by
+        cb = 1.0 - b2 * (0.5 - b2 * (1.0 / 24.0 - b2 / 720.0))
+        sb = by * (1.0 - b2 * (1.0 / 6.0 - b2 * (1.0 / 120.0)))
+        cos[i], sin[i] = c * cb - s * sb, s * cb + c * sb
 
 
 @lean_kernel
 def effective_size(weight: Floats) -> float:
     """Effective number of particles, (sum w)^2 / sum w^2."""
-    total, squares = 0.0, 0.0
+    total, squares, _ = weight_sums(weight)
+    return total * total / squares if squares > 0.0 else 0.0
+
+
+@lean_kernel
+def weight_sums(weight: Floats) -> tuple[float, float, float]:
+    """Sum of weights (n,), sum of their squares, and the greatest."""
+    total, squares, top = 0.0, 0.0, 0.0
     for w in weight:
         total += w
         squares += w * w
-    return total * total / squares if squares > 0.0 else 0.0
+        top = max(top, w)
+    return total, squares, top
 
 
 @kernel

@@ -3,71 +3,28 @@
 
 In: walls (n, 4) and places. Out: `Walls.near` gives the `WallIndex` for kernels; `echo_sources` is such a kernel.
 Owns, in `Walls`, the tables of the tiles that a cloud has reached; they are made when it first comes near.
+
+A tile's tables have its faces, walls that can reflect sound straight back, and its points, places where walls end or meet, with the screens: walls
+that may hide each. All are safe: a source that is left out can be detected from nowhere in the tile, and a wall that is not among the screens hides
+nothing from anywhere in it. So a query gets the exact answer from a few walls [potentially visible sets, Teller and Sequin 1991].
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from echostep.arrays import Floats, Int32s
-from echostep.jit import inline_kernel, inline_part, kernel, lean_kernel, part
-from echostep.walls.index import (
-    BEARINGS,
-    CONE_RAD,
-    EAR_REACH_M,
-    JOIN_M,
-    TILE_M,
-    SourceTable,
-    WallIndex,
-    build_index,
-    segments_cross,
-    tile_at,
-)
-from echostep.walls.tile_points import CORNER, EDGE, WALL, in_sector
-from echostep.walls.visibility import tile_sources
+from echostep.jit import inline_kernel, kernel, lean_kernel, part
+from echostep.walls.index import BEARINGS, EAR_REACH_M, JOIN_M, TILE_M, SourceTable, WallIndex, build_index, tile_at
+from echostep.walls.source_blocks import Limits, list_of_unit, one_receiver, set_receiver
+from echostep.walls.tile_faces import tile_faces
+from echostep.walls.tile_geometry import SLACK_M
+from echostep.walls.tile_points import tile_points
 
-__all__ = ["CORNER", "EDGE", "MOST_SOURCES", "WALL", "Walls", "echo_sources"]
-
-
-MOST_SOURCES = 8  # of one ping: the nearest ones mask the others
+__all__ = ["Walls", "are_tabulated", "echo_sources", "list_sources", "one_receiver", "unit_at"]
 FARTHEST_M = 3.0  # greatest `reach_m`: it bounds the tiles made at once
-FOOT_M = 1e-3  # a wall so close before another does not hide it: walls drawn twice
-NEAREST_M = 1e-6  # a source no further away has no direction
-CONE = math.cos(CONE_RAD)
-
-
-class Receiver(NamedTuple):
-    """A ranger: its place (m), and the unit vector of its axis."""
-
-    x: float
-    y: float
-    axis_x: float
-    axis_y: float
-
-
-class Limits(NamedTuple):
-    """Sources that a query leaves out because they cannot be the first echo.
-
-    Edges farther than `edge_m`, and sources farther than a wall within `sure_m` whose foot is off the axis by at most `sure_cos` (a cosine).
-    """
-
-    sure_m: float
-    sure_cos: float
-    edge_m: float
-
-
-EVERYTHING = Limits(0.0, 1.0, EAR_REACH_M)
-
-
-class SourceList(NamedTuple):
-    """Echo sources found so far, nearest first, each array (MOST_SOURCES,): distance (m), cosine off the axis and later the angle (rad), kind."""
-
-    distance_m: Floats
-    off_axis: Floats
-    kind: Floats
 
 
 class Walls:
@@ -132,6 +89,41 @@ def _tabulate(tiles: Int32s, index: WallIndex) -> WallIndex:
 
 
 @part
+def tile_sources(tile: int, index: WallIndex, slant: float) -> tuple[SourceTable, SourceTable]:
+    """Faces and points that can be detected from a tile, for sound up to `slant` (tangent) off the normal of a wall."""
+    corners = np.empty((4, 2))
+    x, y = index.x0_m + tile % index.columns * TILE_M, index.y0_m + tile // index.columns * TILE_M
+    for k in range(4):
+        corners[k, 0] = x + (TILE_M + SLACK_M if k in (1, 2) else -SLACK_M)
+        corners[k, 1] = y + (TILE_M + SLACK_M if k in (2, 3) else -SLACK_M)
+    near = _walls_near(tile, index)
+    return tile_faces(corners, near, index.walls, slant), tile_points(corners, near, index)
+
+
+@part
+def _walls_near(tile: int, index: WallIndex) -> Int32s:
+    """Numbers of the walls that may be within EAR_REACH_M of a tile, ascending."""
+    reach = math.ceil((EAR_REACH_M + JOIN_M) / TILE_M)
+    column, row = tile % index.columns, tile // index.columns
+    left, right = max(column - reach, 0), min(column + reach + 1, index.columns)
+    numbers = np.empty(64, np.int32)
+    count = 0
+    for r in range(max(row - reach, 0), min(row + reach + 1, index.rows)):
+        for k in range(index.start[r * index.columns + left], index.start[r * index.columns + right]):
+            if count == len(numbers):
+                numbers = np.concatenate((numbers, numbers))
+            numbers[count] = index.ids[k]
+            count += 1
+    numbers = np.sort(numbers[:count])
+    unique = 0
+    for k in range(count):
+        if unique == 0 or numbers[k] != numbers[unique - 1]:
+            numbers[unique] = numbers[k]
+            unique += 1
+    return numbers[:unique]
+
+
+@part
 def _appended(table: SourceTable, tile: int, more: SourceTable) -> SourceTable:
     """`table` of `tile` tiles with one more tile, in arrays that are at least doubled when they grow."""
     unit, rows = tile * BEARINGS, table.tile_start[tile]
@@ -177,30 +169,30 @@ def _copy_rows(rows: Floats, count: int, into: Floats, at: int) -> None:
             into[at + k, column] = rows[k, column]
 
 
-@lean_kernel
-def echo_sources(
-    px: float, py: float, axis_rad: float, index: WallIndex, distance_m: Floats, off_axis_rad: Floats, kind: Floats
-) -> int:
-    """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
-
-    WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
-    place where a wall ends or walls turn. Raises LookupError where `Walls.near` has not been.
-    """
-    receiver = Receiver(px, py, math.cos(axis_rad), math.sin(axis_rad))
-    return first_sources(receiver, axis_rad, index, EVERYTHING, SourceList(distance_m, off_axis_rad, kind))
-
-
 @inline_kernel
-def first_sources(receiver: Receiver, axis_rad: float, index: WallIndex, limits: Limits, sources: SourceList) -> int:
-    """`echo_sources` of a receiver with this bearing of its axis, without the sources that `limits` leaves out: for loops over many receivers."""
-    u = _unit_of(receiver.x, receiver.y, axis_rad, index)
-    if u < 0:
+def unit_at(x: float, y: float, axis_rad: float, index: WallIndex) -> int:
+    """Tile and bearing of a receiver, as tile * BEARINGS + bearing; negative outside the grid, and for numbers that are not finite."""
+    turns = axis_rad * (0.5 / math.pi)
+    share = turns - math.floor(turns)
+    return tile_at(x, y, index) * BEARINGS + min(int(share * BEARINGS), BEARINGS - 1) if share >= 0.0 else -1
+
+
+@lean_kernel
+def list_sources(count: int, unit: int, index: WallIndex, limits: Limits, block: Floats) -> int:
+    """List the sources of the first `count` receivers, all in one unit [`unit_at`], without those that cannot be the first echo.
+
+    `limits`: sources farther than a wall within the first (m), whose foot is off the axis by at most the second (a cosine), are left out, and edges
+    farther than the third (m).
+    WALL: foot of the perpendicular on a wall. CORNER: inside of a corner that is about square, where two reflections send sound back. EDGE: any other
+    place where a wall ends or walls turn. Returns the length of the longest list. Raises LookupError where `Walls.near` has not been.
+    """
+    if unit < 0:
         return 0
-    n, reach_m = _add_faces(receiver, index.walls, index.faces, u, limits, sources)
-    n = _add_points(receiver, index.walls, index.points, u, n, reach_m, limits, sources)
-    for i in range(n):
-        sources.off_axis[i] = _angle(sources.off_axis[i])
-    return n
+    tile, bearing = unit // BEARINGS, unit % BEARINGS
+    k = index.tile_number[tile] - 1
+    if not 0 <= k < index.tabulated:
+        raise LookupError("the tile has no table: Walls.near makes it")
+    return list_of_unit(count, k * BEARINGS + bearing, index.walls, index.faces, index.points, limits, block)
 
 
 @lean_kernel
@@ -213,121 +205,11 @@ def are_tabulated(x: Floats, y: Floats, index: WallIndex) -> bool:
     return True
 
 
-@inline_part
-def _unit_of(x: float, y: float, axis_rad: float, index: WallIndex) -> int:
-    """The unit of `SourceTable` for a pose; -1 where there are no sources. Raises LookupError for a tile without a table, which is never silence."""
-    tile = tile_at(x, y, index)
-    if tile < 0 or not math.isfinite(axis_rad):
-        return -1
-    k = index.tile_number[tile] - 1
-    if not 0 <= k < index.tabulated:
-        raise LookupError("the tile has no table: Walls.near makes it")
-    return k * BEARINGS + bearing(axis_rad)
+@lean_kernel
+def echo_sources(px: float, py: float, axis_rad: float, index: WallIndex, block: Floats) -> int:
+    """Unhidden echo sources within half a cone of CONE_RAD and EAR_REACH_M, nearest first, at most MOST_SOURCES; their number.
 
-
-@inline_part
-def bearing(axis_rad: float) -> int:
-    """Which of the BEARINGS of `SourceTable` an axis has."""
-    turns = axis_rad * (0.5 / math.pi)
-    return min(int((turns - math.floor(turns)) * BEARINGS), BEARINGS - 1)
-
-
-@inline_part
-def _add_faces(
-    receiver: Receiver, walls: Floats, faces: SourceTable, u: int, limits: Limits, sources: SourceList
-) -> tuple[int, float]:
-    """Feet of perpendiculars on the walls of unit u, with cosines off the axis; their number, and the distance up to which a source can be first.
-
-    In the wall's own axes: s along its tangent t, h to the left of it.
-
-          h ^
-            |      o receiver (s, h)        d = |h|
-            |      |
-            o------x----------> s      x: the source, at 0 <= s <= length
-          start   foot         end
+    They are in the lists of the block's first receiver [`one_receiver`]. Raises LookupError like `list_sources`.
     """
-    px, py, ax, ay = receiver
-    n, reach_m = 0, EAR_REACH_M
-    for position in range(faces.start[u], faces.start[u + 1]):
-        i = faces.order[position]
-        dx, dy = px - faces.rows[i, 0], py - faces.rows[i, 1]
-        tx, ty = faces.rows[i, 2], faces.rows[i, 3]
-        s, h = dx * tx + dy * ty, dy * tx - dx * ty
-        d = abs(h)
-        ahead = (ax * ty - ay * tx) * h
-        if not (ahead >= CONE * d and 0.0 <= s <= faces.rows[i, 4] and NEAREST_M < d <= reach_m):
-            continue
-        share = 1.0 - FOOT_M / d
-        qx, qy = px + share * h * ty, py - share * h * tx
-        if d > FOOT_M and hidden(px, py, qx, qy, walls, faces, i):
-            continue
-        n = _insert(n, d, ahead / d, WALL, sources)
-        if d <= limits.sure_m and ahead >= limits.sure_cos * d:
-            reach_m = d
-    return n, reach_m
-
-
-@inline_part
-def _add_points(
-    receiver: Receiver,
-    walls: Floats,
-    points: SourceTable,
-    u: int,
-    n: int,
-    reach_m: float,
-    limits: Limits,
-    sources: SourceList,
-) -> int:
-    """Corners and edges of unit u up to `reach_m`, after the n sources found before; the new number."""
-    px, py, ax, ay = receiver
-    for position in range(points.start[u], points.start[u + 1]):
-        i = points.order[position]
-        if points.rows[i, 7] > reach_m * reach_m:
-            break  # nearest first
-        dx, dy = points.rows[i, 0] - px, points.rows[i, 1] - py
-        ahead, d2 = dx * ax + dy * ay, dx * dx + dy * dy
-        most_m = min(reach_m, limits.edge_m) if points.rows[i, 2] == EDGE else reach_m
-        if not (ahead > 0.0 and ahead * ahead >= CONE * CONE * d2 and d2 <= most_m * most_m):
-            continue
-        if not in_sector(-dx, -dy, points.rows[i, 3], points.rows[i, 4], points.rows[i, 5], points.rows[i, 6]):
-            continue
-        d = math.sqrt(d2)
-        share = 1.0 - JOIN_M / d
-        if d <= NEAREST_M or (share > 0.0 and hidden(px, py, px + share * dx, py + share * dy, walls, points, i)):
-            continue
-        n = _insert(n, d, ahead / d, points.rows[i, 2], sources)
-    return n
-
-
-@inline_part
-def hidden(px: float, py: float, qx: float, qy: float, walls: Floats, table: SourceTable, i: int) -> bool:
-    """Whether one of the walls that can hide row i lies between p and q."""
-    for j in range(table.screen_start[i], table.screen_start[i + 1]):  # noqa: SIM110 (numba)
-        if segments_cross(px, py, qx, qy, walls, table.screens[j]):
-            return True
-    return False
-
-
-@inline_part
-def _angle(cosine: float) -> float:
-    """Arc cosine within the cone, to 1e-8: its series in 1 - cosine."""
-    x = max(1.0 - cosine, 0.0)
-    series = 35.0 / 18432.0 + x * (63.0 / 90112.0 + x * (231.0 / 851968.0))
-    series = 1.0 + x * (1.0 / 12.0 + x * (3.0 / 160.0 + x * (5.0 / 896.0 + x * series)))
-    return math.sqrt(2.0 * x) * series
-
-
-@inline_part
-def _insert(n: int, d: float, off: float, new_kind: float, sources: SourceList) -> int:
-    """Insert a source among n, nearest first; beyond MOST_SOURCES the farthest is dropped."""
-    distance_m, off_axis, kind = sources
-    i = n
-    if n == MOST_SOURCES:
-        if d >= distance_m[n - 1]:
-            return n
-        i = n - 1
-    while i > 0 and distance_m[i - 1] > d:
-        distance_m[i], off_axis[i], kind[i] = distance_m[i - 1], off_axis[i - 1], kind[i - 1]
-        i -= 1
-    distance_m[i], off_axis[i], kind[i] = d, off, new_kind
-    return min(n + 1, MOST_SOURCES)
+    set_receiver(block, 0, px, py, math.cos(axis_rad), math.sin(axis_rad))
+    return list_sources(1, unit_at(px, py, axis_rad, index), index, (0.0, 1.0, EAR_REACH_M), block)

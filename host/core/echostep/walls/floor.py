@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The walkable floor of a plan, on its sheet of levels: where an unknown start may be.
 
-In: walls (n, 4) on the sheet. Out: `Floor`: cells not too near to any wall, inside the building. Owns nothing.
+In: walls (n, 4) on the sheet. Out: `Floor`: cells not too near to any wall, inside the building; `Indoors`. Owns nothing.
 
 A place is inside if walls are in sight in at least half of all directions: a yard that is open on one side is, a lawn before a facade is not.
 """
@@ -15,7 +15,6 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Octets
 from echostep.jit import inline_part, kernel
-from echostep.walls.near_walls import mark_near_walls
 
 # Assumed, not measured.
 CELL_M = 0.25  # side of a cell
@@ -27,6 +26,7 @@ SIGHT_M = 40.0  # how far walls are looked for
 EDGE_M = 2.0  # of the grid around the walls
 HALL_M = 3.0  # distance from a wall up to which floor counts where no wall encloses any
 MOST_CELLS = 40_000_000
+WALL_CELLS = 2  # cells about an indoor one that count as indoors: those under the walls, half a metre
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,3 +115,54 @@ def _meet(met: Octets, seen: Octets) -> None:
     """Mark what is blocked in `seen`, as far as both reach."""
     for c in range(min(len(met), len(seen))):
         met[c] |= seen[c]
+
+
+@kernel
+def mark_near_walls(walls: Floats, reach: float, blocked: Bools) -> None:
+    """Mark the cells whose centre is nearer than `reach` to a wall (n, 4); all lengths in cells."""
+    rows, columns = blocked.shape
+    for k in range(len(walls)):
+        ax, ay, bx, by = walls[k]
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        for r in range(max(int(min(ay, by) - reach - 1), 0), min(int(max(ay, by) + reach + 2), rows)):
+            for c in range(max(int(min(ax, bx) - reach - 1), 0), min(int(max(ax, bx) + reach + 2), columns)):
+                px, py = c + 0.5 - ax, r + 0.5 - ay
+                s = min(max((px * dx + py * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+                if (px - s * dx) ** 2 + (py - s * dy) ** 2 < reach * reach:
+                    blocked[r, c] = True
+
+
+@dataclass(frozen=True, slots=True)
+class Indoors:
+    """A grid of cells from (`west_m`, `south_m`) on, with a margin of cells that are outside: `inside` (rows, columns)."""
+
+    west_m: float
+    south_m: float
+    inside: Bools
+
+    def holds(self, x_m: Floats, y_m: Floats) -> Bools:
+        """Whether places (n,) are indoors."""
+        rows, columns = self.inside.shape
+        column = np.clip(np.floor((x_m - self.west_m) / CELL_M), 0, columns - 1).astype(np.int64)
+        row = np.clip(np.floor((y_m - self.south_m) / CELL_M), 0, rows - 1).astype(np.int64)
+        held: Bools = self.inside[row, column]
+        return held
+
+
+def indoors(floor: Floor) -> Indoors | None:
+    """The cells of a floor that walls enclose, and those under adjacent walls; None if walls enclose none."""
+    x_m, y_m = floor.x_m[floor.enclosed], floor.y_m[floor.enclosed]
+    return inside_grid(x_m, y_m) if len(x_m) else None
+
+
+def inside_grid(x_m: Floats, y_m: Floats) -> Indoors:
+    """The grid of cells with these centres (n,), n > 0, and of the cells under adjacent walls."""
+    margin = WALL_CELLS + 1
+    west_m, south_m = (float(v.min()) - (margin + 0.5) * CELL_M for v in (x_m, y_m))
+    column, row = (np.rint((v - low) / CELL_M - 0.5).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))
+    inside = np.zeros((int(row.max()) + margin + 1, int(column.max()) + margin + 1), np.bool_)
+    inside[row, column] = True
+    for axis in (0, 1):  # the margin holds what goes round
+        inside = np.logical_or.reduce([np.roll(inside, by, axis) for by in range(-WALL_CELLS, WALL_CELLS + 1)])
+    return Indoors(west_m, south_m, inside)

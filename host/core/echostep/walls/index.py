@@ -27,7 +27,10 @@ CONE_RAD = math.radians(40.0)
 MAX_TILES = 40_000_000  # a plan with more is not in metres, and its index would fill the memory
 SHORTEST_M = 1e-6  # shorter walls are left out
 FACE, POINT = 5, 8  # columns of the rows of a face and of a point (`WallIndex`)
+GROUP, MOST_TILES = 64, 32  # moves that are checked together, and tiles around them up to which that is faster
 BEARINGS = 16  # sectors of the ranger's axis for which the tables list their rows
+
+Wall = tuple[float, float, float, float]  # start x, y, end x, y (m)
 
 
 class SourceTable(NamedTuple):
@@ -117,46 +120,53 @@ NO_WALLS = build_index(np.zeros((0, 4)))
 @kernel
 def _walls_by_tile(walls: Floats, x0: float, y0: float, columns: int, rows: int) -> tuple[Int32s, Int32s]:
     """For each tile, the walls that come within JOIN_M of it, as starts and ids in order."""
-    start = np.zeros(columns * rows + 1, np.int32)
-    for w in range(len(walls)):
-        low, high = _row_span(walls, w, y0, rows)
-        for r in range(low, high):
-            first, beyond = _column_span(walls, w, r, x0, y0, columns)
-            for t in range(r * columns + first, r * columns + beyond):
-                start[t] += 1
-    total = 0
-    for t in range(len(start)):
-        total += start[t]
-        start[t] = total
-    ids = np.empty(total, np.int32)
-    for w in range(len(walls) - 1, -1, -1):
-        low, high = _row_span(walls, w, y0, rows)
-        for r in range(low, high):
-            first, beyond = _column_span(walls, w, r, x0, y0, columns)
-            for t in range(r * columns + first, r * columns + beyond):
-                start[t] -= 1
-                ids[start[t]] = w
+    start, ids = np.zeros(columns * rows + 1, np.int32), np.empty(0, np.int32)
+    for is_counted in (False, True):
+        for w in range(len(walls) - 1, -1, -1):
+            wall = wall_at(walls, w)
+            low, high = _row_span(wall, y0, rows)
+            for r in range(low, high):
+                first, beyond = _column_span(wall, r, x0, y0, columns)
+                for t in range(r * columns + first, r * columns + beyond):
+                    start[t] += -1 if is_counted else 1
+                    if is_counted:
+                        ids[start[t]] = w
+        if not is_counted:
+            for t in range(1, len(start)):
+                start[t] += start[t - 1]
+            ids = np.empty(start[-1], np.int32)
     return start, ids
 
 
 @inline_part
-def _row_span(walls: Floats, w: int, y0: float, rows: int) -> tuple[int, int]:
-    """Rows of tiles that a wall touches."""
-    low, high = min(walls[w, 1], walls[w, 3]), max(walls[w, 1], walls[w, 3])
-    return max(int((low - JOIN_M - y0) / TILE_M), 0), min(int((high + JOIN_M - y0) / TILE_M) + 1, rows)
+def wall_at(walls: Floats, j: int) -> Wall:
+    """Start and end of wall j."""
+    return walls[j, 0], walls[j, 1], walls[j, 2], walls[j, 3]
 
 
 @inline_part
-def _column_span(walls: Floats, w: int, r: int, x0: float, y0: float, columns: int) -> tuple[int, int]:
+def _row_span(wall: Wall, y0: float, rows: int) -> tuple[int, int]:
+    """Rows of tiles that a wall touches: the first, and the one beyond the last."""
+    return _tiles(min(wall[1], wall[3]) - y0, max(wall[1], wall[3]) - y0, rows)
+
+
+@inline_part
+def _column_span(wall: Wall, r: int, x0: float, y0: float, columns: int) -> tuple[int, int]:
     """Columns of tiles that a wall touches within a row."""
-    ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+    ax, ay, bx, by = wall
     if abs(by - ay) > JOIN_M:
         slope = (bx - ax) / (by - ay)
         below = max(min(ay, by), y0 + r * TILE_M - JOIN_M)
         above = min(max(ay, by), y0 + (r + 1) * TILE_M + JOIN_M)
         ax, bx = ax + slope * (below - ay), ax + slope * (above - ay)
-    low, high = min(ax, bx), max(ax, bx)
-    return max(int((low - JOIN_M - x0) / TILE_M), 0), min(int((high + JOIN_M - x0) / TILE_M) + 1, columns)
+    return _tiles(min(ax, bx) - x0, max(ax, bx) - x0, columns)
+
+
+@inline_part
+def _tiles(low_m: float, high_m: float, count: int) -> tuple[int, int]:
+    """Of `count` tiles in a line, those within JOIN_M of a span: the first, and the one beyond the last."""
+    low, high = (low_m - JOIN_M) / TILE_M, (high_m + JOIN_M) / TILE_M
+    return int(min(max(low, 0.0), count)), int(min(max(high + 1.0, 0.0), count))
 
 
 @inline_part
@@ -169,9 +179,9 @@ def tile_at(x: float, y: float, index: WallIndex) -> int:
 
 
 @inline_part
-def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j: int) -> bool:
-    """Whether the segment a-b meets wall j; touching counts, gliding along it does not."""
-    cx, cy, dx, dy = walls[j, 0], walls[j, 1], walls[j, 2], walls[j, 3]
+def segments_cross(ax: float, ay: float, bx: float, by: float, wall: Wall) -> bool:
+    """Whether the segment a-b meets a wall; touching counts, gliding along it does not."""
+    cx, cy, dx, dy = wall
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
     d1 = ux * (cy - ay) - uy * (cx - ax)
     d2 = ux * (dy - ay) - uy * (dx - ax)
@@ -183,54 +193,42 @@ def segments_cross(ax: float, ay: float, bx: float, by: float, walls: Floats, j:
 @lean_kernel
 def crosses_wall(ax: float, ay: float, bx: float, by: float, index: WallIndex) -> bool:
     """Whether a move from a to b crosses any wall; never for a move that is not finite."""
-    walls, start, ids, x0, y0 = index.walls, index.start, index.ids, index.x0_m, index.y0_m
-    columns, rows = index.columns, index.rows
-    c0, r0, c1, r1 = (ax - x0) / TILE_M, (ay - y0) / TILE_M, (bx - x0) / TILE_M, (by - y0) / TILE_M
-    if not (min(c0, c1, r0, r1) >= 0.0 and max(c0, c1) < columns and max(r0, r1) < rows):
-        c0, r0, c1, r1 = _clipped(c0, r0, c1, r1, columns, rows)
-        if not c0 >= 0.0:
-            return False
-    pieces = int(max(abs(c1 - c0), abs(r1 - r0))) + 1
-    c1, r1 = (c1 - c0) / pieces, (r1 - r0) / pieces
-    for _ in range(pieces):
-        left, right = int(min(c0, c0 + c1)), min(int(max(c0, c0 + c1)), columns - 1)
-        for r in range(int(min(r0, r0 + r1)), min(int(max(r0, r0 + r1)), rows - 1) + 1):
-            for k in range(start[r * columns + left], start[r * columns + right + 1]):
-                if segments_cross(ax, ay, bx, by, walls, ids[k]):
-                    return True
-        c0, r0 = c0 + c1, r0 + r1
+    if not (math.isfinite(bx - ax) and math.isfinite(by - ay)):
+        return False
+    low, high = _row_span((ax, ay, bx, by), index.y0_m, index.rows)
+    for r in range(low, high):
+        first, beyond = _column_span((ax, ay, bx, by), r, index.x0_m, index.y0_m, index.columns)
+        for k in range(index.start[r * index.columns + first], index.start[r * index.columns + beyond]):
+            if segments_cross(ax, ay, bx, by, wall_at(index.walls, index.ids[k])):
+                return True
     return False
 
 
 @kernel
 def crossings(from_x: Floats, from_y: Floats, to_x: Floats, to_y: Floats, index: WallIndex) -> Bools:
-    """Which moves (n,) cross a wall."""
-    crosses = np.empty(len(to_x), np.bool_)
-    for i in range(len(to_x)):
-        crosses[i] = crosses_wall(from_x[i], from_y[i], to_x[i], to_y[i], index)
+    """Which moves (n,) cross a wall: in groups, against the walls in the box around each group, or one by one where that has many tiles."""
+    crosses = np.zeros(len(to_x), np.bool_)
+    for begin in range(0, len(to_x), GROUP):
+        end = min(begin + GROUP, len(to_x))
+        ax, ay, bx, by = from_x[begin:end], from_y[begin:end], to_x[begin:end], to_y[begin:end]
+        if not _cross_in_box(ax, ay, bx, by, index, crosses[begin:end]):
+            for i in range(end - begin):
+                crosses[begin + i] = crosses_wall(ax[i], ay[i], bx[i], by[i], index)
     return crosses
 
 
 @part
-def _clipped(c0: float, r0: float, c1: float, r1: float, columns: int, rows: int) -> tuple[float, float, float, float]:
-    """The part of a move that is on the grid, in tiles [Liang, Barsky 1984]; -1 if there is none or the move is not finite."""
-    if not (math.isfinite(c1 - c0) and math.isfinite(r1 - r0)):
-        return -1.0, -1.0, -1.0, -1.0
-    enter, leave = _within(c0, c1 - c0, columns, 0.0, 1.0)
-    enter, leave = _within(r0, r1 - r0, rows, enter, leave)
-    if not enter < leave:
-        return -1.0, -1.0, -1.0, -1.0
-    c, r = c1 - c0, r1 - r0
-    return (
-        min(max(c0 + enter * c, 0.0), columns - 1e-6), min(max(r0 + enter * r, 0.0), rows - 1e-6),
-        min(max(c0 + leave * c, 0.0), columns - 1e-6), min(max(r0 + leave * r, 0.0), rows - 1e-6),
-    )  # fmt: skip
-
-
-@part
-def _within(offset: float, along: float, width: float, enter: float, leave: float) -> tuple[float, float]:
-    """Share of a move at which it enters 0 to `width` along one axis, and at which it leaves."""
-    if along == 0.0:
-        return (enter, leave) if 0.0 <= offset <= width else (1.0, 0.0)
-    near, far = -offset / along, (width - offset) / along
-    return max(enter, min(near, far)), min(leave, max(near, far))
+def _cross_in_box(ax: Floats, ay: Floats, bx: Floats, by: Floats, index: WallIndex, crosses: Bools) -> bool:
+    """Mark the moves (n,) from a to b that cross a wall in the box around them; False if the box has many tiles, or is not finite."""
+    left, right = min(ax.min(), bx.min()), max(ax.max(), bx.max())
+    low, high = min(ay.min(), by.min()), max(ay.max(), by.max())
+    if not (right - left) * (high - low) < MOST_TILES * TILE_M * TILE_M:
+        return False
+    first, beyond = _tiles(left - index.x0_m, right - index.x0_m, index.columns)
+    below, above = _tiles(low - index.y0_m, high - index.y0_m, index.rows)
+    for r in range(below, above):
+        for k in range(index.start[r * index.columns + first], index.start[r * index.columns + beyond]):
+            wall = wall_at(index.walls, index.ids[k])
+            for i in range(len(ax)):
+                crosses[i] |= segments_cross(ax[i], ay[i], bx[i], by[i], wall)
+    return True

@@ -39,7 +39,7 @@ from echostep.particles.kernels import (
 )
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import Plan
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.floor import walkable_floor
 from echostep.walls.index import WallIndex
 from echostep.walls.level_sheet import LevelSheet, lay_out_levels, level_of
@@ -50,10 +50,10 @@ from echostep_studies.bench.filtering import WARM_UP, Claim, FilterRun
 def weight_by_ping(particles: ParticleArrays, axis: float, range_m: float, model: EchoModel, walls: WallIndex) -> float:
     """Multiply each weight by p(range | pose); returns the mean likelihood before. The greatest log-weight becomes 0."""
     x, y, turn, _, log_weight = particles
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
+    block, distance_m, off_axis_rad, kind = one_receiver()
     top, weight, evidence = -np.inf, 0.0, 0.0
     for i in range(len(x)):
-        count = echo_sources(x[i], y[i], axis + turn[i], walls, distance_m, off_axis_rad, kind)
+        count = echo_sources(x[i], y[i], axis + turn[i], walls, block)
         likelihood = echo_density(range_m, count, distance_m, off_axis_rad, kind, model)
         w = math.exp(log_weight[i])
         weight += w
@@ -137,8 +137,8 @@ class AugmentedMcl:
         p, dx, dy = self._particles, share * segment.dx_m, share * segment.dy_m
         walls = self._walls.near(p.x_m, p.y_m, math.hypot(dx, dy))
         arrays = begin_segment(p)
-        top, _ = propagate(p, arrays, MovePiece(dx, dy, 0.0, 0.0), 1.0, noise, math.exp(-s.wall_cost), walls)
-        end_segment(p, arrays, top)
+        propagate(p, arrays, MovePiece(dx, dy, 0.0, 0.0), 1.0, noise, math.exp(-s.wall_cost), walls)
+        end_segment(p, arrays.weight)
 
     def _weight(self, axis: float, range_m: float, walk_heading_rad: float) -> None:
         """Weights and their mean (lines 5 to 10 of the table), then resampling (lines 11 to 16)."""

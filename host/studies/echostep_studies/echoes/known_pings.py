@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.echoes.likelihood import EchoModel, echo_density, outlier_density, planned_density
+from echostep.echoes.likelihood import EchoModel, after_source, echo_density, outlier_density, planned_density
 from echostep.jit import kernel
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.index import EAR_REACH_M, WallIndex
 
 
 class KnownPings(NamedTuple):
-    """`range_m` (n,), 0: no echo. `listed` (n,) sources, nearest first: `distance_m`, `off_axis_rad`, `kind` (n, MOST_SOURCES)."""
+    """`range_m` (n,), 0: no echo. `listed` (n,) sources, nearest first: `distance_m`, `off_axis_rad`, `kind` (n, most)."""
 
     range_m: Floats
     listed: Ints
@@ -38,11 +38,12 @@ def known_pings(walls: Walls, x_m: Floats, y_m: Floats, axis_rad: Floats, range_
 @kernel
 def _sources(x: Floats, y: Floats, axis: Floats, index: WallIndex) -> tuple[Ints, Floats, Floats, Floats]:
     """Sources before each pose."""
-    n = len(x)
-    count, distance_m = np.zeros(n, np.int64), np.zeros((n, MOST_SOURCES))
-    off_axis_rad, kind = np.zeros((n, MOST_SOURCES)), np.zeros((n, MOST_SOURCES))
-    for i in range(n):
-        count[i] = echo_sources(x[i], y[i], axis[i], index, distance_m[i], off_axis_rad[i], kind[i])
+    block, distances, angles, kinds = one_receiver()
+    shape, count = (len(x), len(kinds)), np.zeros(len(x), np.int64)
+    distance_m, off_axis_rad, kind = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for i in range(len(x)):
+        count[i] = echo_sources(x[i], y[i], axis[i], index, block)
+        distance_m[i], off_axis_rad[i], kind[i] = distances, angles, kinds
     return count, distance_m, off_axis_rad, kind
 
 
@@ -57,9 +58,10 @@ def log_densities(pings: KnownPings, m: EchoModel, limited: bool = True) -> Floa
     for i in range(len(found)):
         range_m = pings.range_m[i]
         if limited and (range_m > m.maximum_m or 0.0 < range_m < m.minimum_m):
-            density = planned_density(
-                range_m, pings.listed[i], pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i], m.stray, 0.0, m
-            )
+            (unheard, hit), rows = (1.0, 0.0), (pings.distance_m[i], pings.off_axis_rad[i], pings.kind[i])
+            for k in range(pings.listed[i]):
+                unheard, hit = after_source(range_m, unheard, hit, rows[0][k], rows[1][k], rows[2][k], m)
+            density = planned_density(range_m, unheard, hit, m.stray, 0.0)
             density = (1.0 - m.outlier) * (1.0 - m.hidden) * density
             density += m.outlier * (1.0 - outlier_density(0.0, m)) / EAR_REACH_M
         else:

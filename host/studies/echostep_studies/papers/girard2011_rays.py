@@ -13,17 +13,11 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.jit import allocating_part, inline_part, kernel, lean_part
-from echostep.walls.echo_sources import Receiver, bearing, hidden
-from echostep.walls.index import (
-    BEARINGS,
-    CONE_RAD,
-    SourceTable,
-    WallIndex,
-    tile_at,
-)
-from echostep.walls.visibility import tile_sources
+from echostep.walls.echo_sources import tile_sources, unit_at
+from echostep.walls.index import BEARINGS, CONE_RAD, SourceTable, WallIndex, segments_cross, wall_at
 
 SAME_M = 1e-9  # walls so close together are met by a ray at once
+Receiver = tuple[float, float, float, float]  # place (m), unit vector of the axis
 
 
 class Poses(NamedTuple):
@@ -73,18 +67,18 @@ def _cone_ranges(poses: Poses, index: WallIndex, cone: Cone, tables_hold: bool, 
     """Fill `ranges` of the poses; `tables_hold`: whether the index was made for at least this slant."""
     x, y, heading = poses
     for i in range(len(x)):
-        tile = tile_at(x[i], y[i], index)
-        if tile < 0 or not math.isfinite(heading[i]):
+        unit = unit_at(x[i], y[i], heading[i] + 0.5 * math.pi, index)
+        if unit < 0:
             ranges[i, 0] = ranges[i, 1] = cone.maximum_m
             continue
+        tile, left = unit // BEARINGS, unit % BEARINGS
         k = index.tile_number[tile] - 1
         ax, ay = -math.sin(heading[i]), math.cos(heading[i])
-        to_left, to_right = Receiver(x[i], y[i], ax, ay), Receiver(x[i], y[i], -ax, -ay)
+        to_left, to_right = (x[i], y[i], ax, ay), (x[i], y[i], -ax, -ay)
         if not (0 <= k < index.tabulated and tables_hold):
             ranges[i, 0] = _cone_range_without_tables(to_left, tile, index, cone)
             ranges[i, 1] = _cone_range_without_tables(to_right, tile, index, cone)
             continue
-        left = bearing(heading[i] + 0.5 * math.pi)
         right = (left + BEARINGS // 2) % BEARINGS
         left, right = left + k * BEARINGS, right + k * BEARINGS
         ranges[i, 0] = _cone_range(to_left, index.walls, index.faces, left, cone)
@@ -126,6 +120,8 @@ def _cone_range(receiver: Receiver, walls: Floats, faces: SourceTable, u: int, c
         foot = s + length * (rx * tx + ry * ty)
         if not (length < shortest and 0.0 <= foot <= faces.rows[i, 4]):
             continue
-        if not hidden(px, py, px + (length - SAME_M) * rx, py + (length - SAME_M) * ry, walls, faces, i):
-            shortest = length
+        qx, qy, j = px + (length - SAME_M) * rx, py + (length - SAME_M) * ry, faces.screen_start[i]
+        while j < faces.screen_start[i + 1] and not segments_cross(px, py, qx, qy, wall_at(walls, faces.screens[j])):
+            j += 1
+        shortest = length if j == faces.screen_start[i + 1] else shortest
     return shortest

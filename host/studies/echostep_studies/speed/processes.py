@@ -25,15 +25,15 @@ import numpy as np
 from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.particles.arrays import ParticleArrays, PingBatch
 from echostep.particles.kernels import begin_segment
-from echostep.echoes.reweighting import reweight_by_ping
-from echostep.walls.echo_sources import MOST_SOURCES, SourceList, Walls
+from echostep.echoes.reweighting import no_crowds, reweight_by_ping
+from echostep.walls.echo_sources import Walls
+from echostep.walls.source_blocks import new_block
 x = np.linspace(0.5, 3.5, 300)
 index = Walls(np.array([[0.0, 0.0, 4.0, 0.0], [4.0, 0.0, 4.0, 3.0], [4.0, 3.0, 0.0, 3.0]])).near(x, x * 0.5)
 cloud = ParticleArrays(x, x * 0.5, x * 0.1, np.ones(300), np.zeros(300))
 values = (np.array([v]) for v in (1.0, 1.57, 1.2, 1.0, 0, 0.1, 0.3, 0.0, 0.5, 0.5))
 pings, model = PingBatch(*values), echo_model(EchoSettings())
-sources = SourceList(np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES))
-reweight_by_ping(cloud, begin_segment(cloud), np.zeros(300), pings, 0, model, 1.0, index, sources)
+reweight_by_ping(cloud, begin_segment(cloud), np.zeros(300), pings, 0, model, 1.0, index, no_crowds(), new_block())
 print(time.process_time())
 """
 

@@ -16,7 +16,7 @@ from echostep.echoes.likelihood import EchoModel, likeliest_source
 from echostep.jit import kernel
 from echostep.localization import Estimate
 from echostep.path import MeasuredSegment
-from echostep.walls.echo_sources import MOST_SOURCES, Walls, echo_sources
+from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.index import WallIndex
 
 
@@ -74,7 +74,7 @@ def _trunk_pose(measured: MeasuredSegment, estimate: Estimate, t_s: float) -> tu
 @kernel
 def expected_range(x: float, y: float, axis_rad: float, index: WallIndex, model: EchoModel) -> float:
     """Range of the likeliest first echo at a pose; NaN when it is likelier that no echo comes."""
-    distance_m, off_axis_rad, kind = np.empty(MOST_SOURCES), np.empty(MOST_SOURCES), np.empty(MOST_SOURCES)
-    count = echo_sources(x, y, axis_rad, index, distance_m, off_axis_rad, kind)
+    block, distance_m, off_axis_rad, kind = one_receiver()
+    count = echo_sources(x, y, axis_rad, index, block)
     first, answers, unheard = likeliest_source(count, distance_m, off_axis_rad, kind, model)
     return distance_m[first] if answers > unheard else np.nan

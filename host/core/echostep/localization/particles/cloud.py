@@ -21,7 +21,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoModel
-from echostep.echoes.reweighting import CloudModel, EchoMemory, MoveProgress, propagate_and_reweight
+from echostep.echoes.reweighting import CloudModel, MoveProgress, propagate_and_reweight
 from echostep.height.levels import (
     ClimbSettings,
     HeightArrays,
@@ -30,8 +30,7 @@ from echostep.height.levels import (
     level_change_model,
     set_levels_by_pressure,
 )
-from echostep.localization.particles.particles import GATHERED_REST, Particles
-from echostep.localization.particles.sampling import kld_size, log_mode_weight
+from echostep.localization.particles.particles import GATHERED_REST, Particles, kld_size, log_mode_weight
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import CloudSettings
 from echostep.particles.arrays import DrawnPoses, Move, PingBatch
@@ -142,7 +141,7 @@ class Cloud(Particles):
                 self.x_m, self.y_m, rest * math.hypot(move.dx_m, move.dy_m, move.bend_x_m, move.bend_y_m)
             )
             progress, lowest, passed = propagate_and_reweight(
-                self.arrays, move, noise, progress, pings, cloud_model, index, EchoMemory(self.hidden, log_evidence)
+                self.arrays, move, noise, progress, pings, cloud_model, index, self.hidden, log_evidence
             )
             log_passed += passed
             if lowest < -0.5 * settings.wall_cost:  # every particle has crossed a wall

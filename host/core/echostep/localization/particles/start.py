@@ -7,14 +7,15 @@ In: a `Start`. Out: poses drawn from it. Owns nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.height.levels import UNKNOWN_LAG_M2, Air
 from echostep.localization.settings import UNPLANNED_DOOR
-from echostep.plan import ANY_LEVEL, Pose
+from echostep.plan import ANY_LEVEL, Level, Pose
 from echostep.walls.floor import Floor
 from echostep.walls.index import NO_WALLS, WallIndex, crossings
 from echostep.walls.level_sheet import LevelSheet, level_of
@@ -24,6 +25,7 @@ STATED = 0.99  # probability that either is right: its spread is never all that 
 # Standard deviations of a wrong one besides the stated ones: a stride, a foot that is set down turned
 WIDE_SD_M, WIDE_SD_RAD = 0.9, math.radians(30.0)
 WIDE_SHARE = 0.07  # of the particles have either wrong: enough to be found by the first echoes
+HEARD_M = 5.0  # of a wall, within which it places the wearer: the rangers' reach without a second reflection
 TURN_AROUND_RAD = 1.5  # a heading with a greater standard deviation is drawn evenly from all
 
 
@@ -121,3 +123,31 @@ def allowed_floor(floor: Floor, start: Start, sheet: LevelSheet | None) -> Floor
         map_x = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
         allowed &= np.asarray(shapely.contains_xy(shapely.Polygon(start.room_m), map_x, floor.y_m))
     return Floor(floor.x_m[allowed], floor.y_m[allowed], floor.enclosed[allowed]) if allowed.any() else floor
+
+
+class DrawnPlaces:
+    """How well places of a drawing are known in the building: the drawing's own error, added to the error of a place on it.
+
+    A shift of the drawing about a wearer makes no echo fit worse, so no echo reveals it: it widens the claimed errors, and a start that was known in
+    the building. Plans that state none are taken as exact.
+    """
+
+    def __init__(self, levels: Sequence[Level] = ()) -> None:
+        self._places = tuple(level.place_sd for level in levels)
+        self.are_stated = any(len(rows) for rows in self._places)
+
+    def sd_m(self, x_m: float, y_m: float, level: int) -> float:
+        """Standard deviation per axis of the drawing about a place: the largest of the walls in range there, or the nearest one's."""
+        rows = self._places[level] if 0 <= level < len(self._places) else np.zeros((0, 3))
+        if not len(rows):
+            return 0.0
+        away_m: Floats = np.hypot(rows[:, 0] - x_m, rows[:, 1] - y_m)
+        near = away_m < max(HEARD_M, float(away_m.min()) + 1e-9)
+        return float(rows[near, 2].max())
+
+    def widened(self, start: Start) -> Start:
+        """A start that is known in the building, as a start on the drawing."""
+        if not self.are_stated or start.pose is None or start.pose.level == ANY_LEVEL:
+            return start
+        sd_m = self.sd_m(start.pose.x_m, start.pose.y_m, start.pose.level)
+        return replace(start, sd_m=math.hypot(start.sd_m, sd_m)) if sd_m else start
