@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from typer.testing import CliRunner
@@ -255,13 +256,13 @@ def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     plan = flat([[0, 0, 10, 0], [10, 0, 10, 10], [10, 10, 0, 10], [0, 10, 0, 0]], rooms=rooms)
     findings = [PlanFinding("gap", 0, (2.0, 2.0), "x", (), k) for k in range(1, 5)]
     figures: list[Figure] = []
-    save = Figure.savefig
+    save = FigureCanvasAgg.print_png
 
-    def kept(figure: Figure, *arguments: Any, **options: Any) -> None:
-        figures.append(figure)
-        save(figure, *arguments, **options)
+    def kept(canvas: FigureCanvasAgg, *arguments: Any, **options: Any) -> None:
+        figures.append(canvas.figure)
+        save(canvas, *arguments, **options)
 
-    monkeypatch.setattr(Figure, "savefig", kept)
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", kept)
     draw_plan(plan, tmp_path / "plan.png", [0], None, findings)
     (axes,) = figures[0].axes
     boxes = [text.get_window_extent() for text in axes.texts]

@@ -60,6 +60,17 @@ def made(folder: Path, kind: str) -> bytes:
     return out.read_bytes()
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["cut", "repair"])
+def test_a_flipped_bit_of_what_we_write_costs_less_than_a_second(tmp_path: Path, kind: str) -> None:
+    whole, rng = made(tmp_path, kind), random.Random(1)
+    for _ in range(40):
+        path = tmp_path / "flip.mcap"
+        path.write_bytes(flipped(whole, rng.randrange(8, len(whole)), rng.randrange(8)))
+        found = read(path)[1]
+        assert sum(chunk in set(found) for chunk in CHUNKS) > len(CHUNKS) - CHUNKS_A_SECOND
+
+
 def test_a_flipped_bit_in_a_chunk_that_is_not_compressed_is_told_without_the_files_own_checksum(tmp_path: Path) -> None:
     """The end of the file is missing; the chunk has a checksum of its own."""
     whole, path = made(tmp_path, "repair"), tmp_path / "flip.mcap"

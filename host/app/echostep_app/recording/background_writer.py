@@ -88,10 +88,10 @@ class BackgroundWriter:
             self.notices.append(f"{self.path}: the last {self.unwritten_bytes} bytes are not on the disk")
         if self._thread.is_alive():
             return
-        if not os.fstat(self._file).st_nlink:
-            self.is_whole = False
-            self.notices.append(f"{self.path}: was removed while it was written; nothing of it is left")
         try:
+            if not os.fstat(self._file).st_nlink:
+                self.is_whole = False
+                self.notices.append(f"{self.path}: was removed while it was written; nothing of it is left")
             os.close(self._file)
         except OSError as error:  # it is closed all the same [close(2)]
             self.is_whole = False

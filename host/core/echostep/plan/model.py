@@ -230,7 +230,7 @@ def parse_plan(raw: bytes) -> Plan:
         if what := replaced(raw[:32]):
             raise ValueError(what) from error
         if isinstance(error, RecursionError) or str(error).startswith("Exceeds"):
-            raise ValueError("nested too deep, or a number has too many digits") from error
+            raise ValueError("not a plan: nested too deep, or a number has too many digits") from error
         if not isinstance(error, json.JSONDecodeError | UnicodeDecodeError):
             raise
         where = f", line {error.lineno}, column {error.colno}" if isinstance(error, json.JSONDecodeError) else ""
@@ -316,6 +316,8 @@ def _level_index(reference: str | int, where: str, names: list[str]) -> int:
 
 def _outline(points: Sequence[tuple[float, float]], where: str) -> Floats:
     """An outline of at least three corners -> (n, 2) float64; consecutive equal corners count as one."""
+    if len(points) > plan_file.MOST_CORNERS:
+        raise ValueError(f"{where}: {len(points)} corners, expected {plan_file.MOST_CORNERS} at most")
     corners = [corner for corner, _ in groupby(points)]
     if len(corners) > 1 and corners[0] == corners[-1]:
         corners.pop()

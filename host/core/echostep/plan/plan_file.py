@@ -19,7 +19,7 @@ QuestionAbout = Literal["door", "wall", "room"]
 
 Reference = Annotated[Text | int, Meta(description="the name or the index of a level")]
 Point = Annotated[tuple[Metres, Metres], Meta(description="[x, y] in metres")]
-Outline = Annotated[list[Point], Meta(max_length=MOST_CORNERS, description="a list of corners, [x, y] in metres")]
+Outline = Annotated[list[Point], Meta(description="a list of corners, [x, y] in metres")]
 Segment = Annotated[tuple[Metres, Metres, Metres, Metres], Meta(description="[x0, y0, x1, y1] in metres")]
 Segments = Annotated[list[Segment], Meta(description="a list of [x0, y0, x1, y1] in metres")]
 
