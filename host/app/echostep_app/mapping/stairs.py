@@ -19,6 +19,7 @@ from echostep_app.mapping.graph.levels import WalkLevels
 HALF_M = 0.6  # of a flight's width, assumed
 DOOR_M = 1.0  # width of the way in
 CLEAR_M = 0.15  # about the well, in which other walls end: nearer ones are taken for its own
+BEFORE_M = 0.25  # of the well, within which no other door leads: its rim runs along it, as the check of plans says
 LEAST_M = 0.1  # a shorter piece is not a wall
 SHARED = 0.3  # of the smaller well's area: two flights in one well
 
@@ -67,7 +68,8 @@ def with_wells(level: Level, index: int, wells: list[Well]) -> Level:
             continue
         outside, doubtful = (_outside(walls, well) for walls in (level.walls, level.doubtful))
         lines = shapely.linestrings(np.array([door.line for door in level.doors]).reshape(-1, 2, 2))
-        doors = [door for door, line in zip(level.doors, lines, strict=True) if not line.intersects(well.area)]
+        far = shapely.distance(lines, well.area) > BEFORE_M
+        doors = [door for door, is_far in zip(level.doors, far.tolist(), strict=True) if is_far]
         rim, ways = _rim(well, index)
         doors += [Door((float(a), float(b), float(c), float(d)), "open") for a, b, c, d in ways]
         walls = np.concatenate([outside, np.array(rim).reshape(-1, 4)])

@@ -28,9 +28,8 @@ AGREEING = 6  # stances in a row with small scatter, before the yaw is corrected
 REPEATED = 5.0  # correlation length of a disturbance, in stances
 FLOOR = 0.05  # least rms, as a share of the strength: the field bends slowly along a building
 NORTH_SD, IRON_SD = 0.5, 0.15  # initial, as shares of the strength
-NEW_FRAME_RAD2 = (
-    math.radians(10.0) ** 2
-)  # growth of the yaw's variance since the last stance: samples were missing, north is to be found again
+# Growth of the yaw's variance since the last stance, beyond which samples were missing: north is to be found again
+NEW_FRAME_RAD2 = math.radians(10.0) ** 2
 GAIN = 0.08  # of one stance, in the running means of `usual`
 
 # State: north (2) in the walk frame, iron (2) in the foot's axes, error of the yaw
