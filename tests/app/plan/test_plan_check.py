@@ -260,7 +260,7 @@ def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     def kept(canvas: FigureCanvasAgg, *arguments: Any, **options: Any) -> None:
         figures.append(canvas.figure)
-        save(canvas, *arguments, **options)
+        save(canvas, *arguments, **options)  # type: ignore[no-untyped-call]
 
     monkeypatch.setattr(FigureCanvasAgg, "print_png", kept)
     draw_plan(plan, tmp_path / "plan.png", [0], None, findings)

@@ -31,6 +31,7 @@ from recording.damages import arrival_offsets, flipped, message_records, read_by
 from walks import DEMO, walk_chunks
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(1200)]
+CHUNKS_A_SECOND = 50
 CHECKSUM = "its checksum is wrong"
 
 
