@@ -77,11 +77,8 @@ def small_run(building: str, *faults: str) -> dict[str, SimpleRow]:
     ],
 )
 def test_a_known_start_is_tracked_whatever_the_rangers_do_at_first(building: str) -> None:
-    names = [building + kind for kind in ("", "/silent-3", "/silent-20", "/passer-by", "/dead-ranger")]
-    rows = [row for seed in (1, 2, 3) for row in simple_run(names, seed)]
-    for name in names:  # one draw of a long corridor may be in doubt for a tenth of its time
-        assert sum(row.tracking for row in rows if row.name == name) / 3.0 >= 0.97, name
-    for row in rows:
+    for row in small_run(building, "", "/silent-3", "/silent-20", "/passer-by", "/dead-ranger").values():
+        assert row.tracking >= 0.97, row
         assert row.lost == 0.0, row
         assert row.mean_m < WORST_M, row
 
