@@ -106,6 +106,7 @@ def _start(compass: Magnetometer, nav: Nav, h: Floats, strength: float, c: float
     compass.field[NORTH], compass.field[NORTH + 1] = c * h[0] - s * h[1], s * h[0] + c * h[1]
     for i in range(DELTA):
         compass.P[i, i] = ((NORTH_SD if i < IRON else IRON_SD) * strength) ** 2
+    compass.P[DELTA, DELTA] = nav.P[YAW, YAW] if compass.seen[MEASURED] == 1 else 0.0  # of a frame that begins here
     compass.usual[STRENGTH], compass.usual[HEIGHT], compass.usual[SCATTER2] = strength, h[2], 2.0 * SCATTER**2
     compass.yaw_variance[0] = nav.P[YAW, YAW]
 
