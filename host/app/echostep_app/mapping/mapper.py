@@ -98,8 +98,9 @@ def find_walls(graph: Graph) -> None:
 def _anchored(graph: Graph) -> Bools:
     """Which fragments are within KNOWN_M of path of an end of a closure."""
     way_m, ends = graph.nodes.way_m, np.array([(c.old, c.new) for c in graph.closures], np.int64).ravel()
-    near = np.abs(way_m[graph.fragments.node, None] - way_m[ends]) < KNOWN_M
-    anchored: Bools = np.logical_or.reduce(near, axis=1)
+    at_m, ends_m = way_m[graph.fragments.node], np.concatenate([[-np.inf], np.sort(way_m[ends]), [np.inf]])
+    after = np.searchsorted(ends_m, at_m)
+    anchored: Bools = np.minimum(at_m - ends_m[after - 1], ends_m[after] - at_m) < KNOWN_M
     return anchored
 
 
