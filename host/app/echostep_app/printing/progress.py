@@ -48,11 +48,13 @@ def with_bar(
     items: Iterable[Item], text: str, fraction: Callable[[], float | None], on: Console | None = None
 ) -> Iterator[Item]:
     """The same items, with a bar on a terminal; `fraction`, 0 to 1, is asked at each item; None: it is not known."""
+    shown = -1.0
     with bar(text, on) as show:
         for item in items:
             yield item
-            if (done := fraction()) is not None:
+            if (done := fraction()) is not None and done > shown + LEAST_SHARE:
                 show(done)
+                shown = done
 
 
 @contextmanager
@@ -69,6 +71,7 @@ def bar(text: str, on: Console | None = None) -> Iterator[Callable[[float], None
 
 
 REDRAW_S = 0.1
+LEAST_SHARE = 1e-3  # by which a bar grows: items may be many
 
 
 @contextmanager
