@@ -32,10 +32,8 @@ from echostep.walls.source_blocks import BLOCK, DISTANCE, FREE, KIND, OFF_AXIS, 
 # Of the greatest, below which no likelihood is computed: the next resampling drops such particles
 NEGLIGIBLE_WEIGHT = 1e-9
 LEAST_TOP = 1e-100  # greatest weight below which all are rescaled: far from the least number
-CROWDS, SPREAD = (
-    64,
-    11,
-)  # places for particles of one unit that wait, shared by units; a factor that gives neighbouring tiles different ones
+# Places for particles of one unit that wait, shared by units; a factor that gives neighbouring tiles different ones
+CROWDS, SPREAD = 64, 11
 HIDDEN, UNHEARD, HIT, LIKELIHOOD = range(FREE, FREE + 4 * BLOCK, BLOCK)  # more columns of a block
 LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists
 
@@ -93,7 +91,7 @@ def propagate_and_reweight(
         if top < LEAST_TOP:
             for i in range(len(arrays.weight)):
                 arrays.weight[i] /= top
-            total, top = total / top, 1.0
+            total, squares, top = weight_sums(arrays.weight)
         if size < model.resample_below * len(particles.x_m):
             break
     end_segment(particles, arrays.weight)

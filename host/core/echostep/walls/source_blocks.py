@@ -162,11 +162,8 @@ def _insert(count: int, n: int, kind: float, block: Floats) -> int:
         return n
     for i in range(count):
         at = n * BLOCK + i
-        block[DISTANCE + at], block[OFF_AXIS + at], block[KIND + at] = (
-            block[NEW_M + i],
-            block[NEW_COS + i],
-            block[NEW_KIND + i],
-        )
+        block[DISTANCE + at], block[OFF_AXIS + at] = block[NEW_M + i], block[NEW_COS + i]
+        block[KIND + at] = block[NEW_KIND + i]
     return n + 1
 
 
