@@ -112,7 +112,7 @@ def beside(door: Door, by_m: float = BESIDE_M) -> tuple[tuple[float, float], tup
 
 
 def is_walled(door: Door, walls: shapely.STRtree) -> bool:
-    """Whether a wall runs through a door, or along it so near that nobody passes."""
+    """Whether a wall runs through a door, or along it so near that the door is blocked."""
     line = shapely.LineString((door.line[:2], door.line[2:]))
     inner = shapely.LineString([line.interpolate(share, normalized=True) for share in (0.2, 0.8)])
     ways = (inner, shapely.LineString(beside(door, CLEAR_M)))

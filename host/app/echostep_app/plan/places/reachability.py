@@ -38,7 +38,10 @@ def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFindin
     if len(pairs) > 1 and any(pairs) and not any(OUTSIDE in pair for level in pairs for pair in level):
         i = next(i for i, level in enumerate(pairs) if level)  # one level may be a part of a house
         yield PlanFinding(
-            "no exit", i, beside(plan.levels[i].doors[0])[0], "no door and no gap leads outside: nobody gets out"
+            "no exit",
+            i,
+            beside(plan.levels[i].doors[0])[0],
+            "no door and no gap leads outside: the building has no exit",
         )
     for i, level in enumerate(plan.levels):
         with_door = {f for pair in pairs[i] for f in pair}
