@@ -96,7 +96,7 @@ def test_a_file_too_large_to_be_one_building_is_not_read(tmp_path: Path, suffix:
     ("text", "named"),
     [
         (json.dumps({"echostep_plan": 1, "levels": [{"walls": [[0, 0, 100_001, 0]]}]}), "within 100000 m"),
-        ('{"echostep_plan": 1, "levels": ' + "[" * 2000 + "]" * 2000 + "}", "nested too deep"),
+        ('{"echostep_plan": 1, "levels": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
         ('{"echostep_plan": 1, "name": ' + "9" * 5000 + "}", "too many digits"),
         (
             '{"echostep_plan": 1, "levels": [{"walls": [], "rooms": [], "walls": [[0, 0, 1, 0]]}]}',
