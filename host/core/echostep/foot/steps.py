@@ -194,8 +194,9 @@ class Foot:
             )
         events = np.zeros((zupt_state.EVENTS_PER_SAMPLE * len(t_s), zupt_state.EVENT_SIZE))
         state = zupt_state.ZuptInsState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
-        count = zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), zupt_state.Output(events, rows))
-        return [_event(row) for row in events[:count]]
+        output = zupt_state.Output(events, rows, np.zeros(1, np.int64))
+        zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), output)
+        return [_event(row) for row in events[: output.count[0]]]
 
 
 def walk_track(
