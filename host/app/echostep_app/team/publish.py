@@ -195,7 +195,7 @@ class ReportHistory:
     def streams(self, tracker: Tracker, t_s: float) -> StreamReport:
         """Health of the input streams; rates over AVERAGING_S of the clock of `t_s`."""
         state = tracker.streams
-        board, mtx, status = state.board, state.mtx, state.status
+        board, mtx = state.board, state.mtx
         counts = (t_s, mtx.good, board.good)
         self._counts.append(counts)
         while len(self._counts) > 2 and self._counts[1][0] < t_s - AVERAGING_S:
@@ -207,7 +207,7 @@ class ReportHistory:
             board_hz=min(board_hz, 1e6),
             bad=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
             lost=board.lost + mtx.lost,
-            dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
+            dropped=state.reports.dropped,
             synchronised=state.synchronised,
             findings=tuple(
                 printable(f"{f.subject} {f.what}", 100) for f in all_findings(state.reports, state.foot_reports)[:4]

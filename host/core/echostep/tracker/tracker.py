@@ -44,8 +44,7 @@ from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
 from echostep.settings import Settings
 from echostep.tracker import kernels
 from echostep.tracker.before_check_in import BeforeCheckIn
-from echostep.tracker.last_place import LastPlace, last_place
-from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
+from echostep.tracker.state import LastPlace, ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, waiting for their segment; beyond it the oldest are dropped, assumed
@@ -141,8 +140,6 @@ class Tracker:
             pings=front_end.pings,
             synchronised=front_end.timeline.synchronised,
             board_restarts=front_end.timeline.board_restarts,
-            status=front_end.status,
-            identity=front_end.identity,
             reports=replace(reports, gyros=dict(reports.gyros)),
             foot_reports=replace(front_end.foot_source.board.reports) if front_end.foot_source.port == FOOT else None,
         )
@@ -167,7 +164,7 @@ class Tracker:
 
     def last_place(self) -> LastPlace | None:
         """The start of the next run; None unless the status of the newest estimate is `tracking`."""
-        return last_place(self._estimate, None if self.filter is None else self.filter.cloud.air)
+        return LastPlace.of(self._estimate, None if self.filter is None else self.filter.cloud.air)
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
