@@ -71,7 +71,7 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> None:
                 rows[k, out.ROW_POSITION + i] = nav.position[i]
             rows[k, out.ROW_HEADING] = ins.heading(nav)
             rows[k, out.ROW_IN_STANCE] = s.in_stance * (1 - s.pushed)
-            rows[k, out.ROW_EVENT_COUNT] = output.count[0]
+            rows[k, out.ROW_EVENT_COUNT] = output.written[0]
 
 
 @lean_part
@@ -279,8 +279,8 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, output: Output) -> Non
     s.rest_yaw_rad = ins.heading(nav)
     s.stance_tilt[0], s.stance_tilt[1], s.stance_tilt[2] = mounting.tilt(nav)
     if s.walking:
-        _write_step(s, nav, output.events[output.count[0]])
-        output.count[0] += 1
+        _write_step(s, nav, output.events[output.written[0]])
+        output.written[0] += 1
     s.walking = 1
     s.origin[0], s.origin[1], s.origin[2] = nav.position[0], nav.position[1], nav.position[2]
     s.yaw_variance = nav.P[YAW, YAW]
@@ -315,8 +315,8 @@ def _settle(s: ZuptState, nav: Nav) -> None:
 @lean_part
 def _end_stance(foot: ZuptInsState, output: Output) -> None:
     """Write the stance, which ended with its last rest, and apply the magnetometer's yaw correction."""
-    s, nav, row = foot.zupt, foot.nav, output.events[output.count[0]]
-    output.count[0] += 1
+    s, nav, row = foot.zupt, foot.nav, output.events[output.written[0]]
+    output.written[0] += 1
     row[out.KIND], row[out.START_S], row[out.END_S] = out.STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
     row[out.HEADING] = s.rest_yaw_rad
     s.stance_end_s = row[out.END_S]

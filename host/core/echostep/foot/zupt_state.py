@@ -105,11 +105,11 @@ class ImuSample(NamedTuple):
 
 
 class Output(NamedTuple):
-    """`events` (2n, EVENT_SIZE), the first `count` (1,) are filled; `rows` (n, ROW_SIZE) after each sample, or (0, ROW_SIZE) where not wanted."""
+    """`events` (2n, EVENT_SIZE), the first `written` (1,) are filled; `rows` (n, ROW_SIZE) after each sample, or (0, ROW_SIZE) where not wanted."""
 
     events: Floats
     rows: Floats
-    count: Ints
+    written: Ints
 
 
 ZUPT_STATE = record_dtype(ZuptState, array_size=3)
