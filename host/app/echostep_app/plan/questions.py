@@ -90,9 +90,8 @@ def _of_widths(level: Level) -> Iterator[Question]:
     """Doors that are narrower or wider than usual."""
     for door in level.doors:
         if not DOORS_M[0] <= door.width_m <= DOORS_M[1]:
-            x0, y0, x1, y1 = door.line
             text = f"door {door.width_m:.2f} m wide: is it a door?"
-            yield Question(text, "door", ((x0 + x1) / 2, (y0 + y1) / 2), (door.line,))
+            yield Question(text, "door", door.middle_m, (door.line,))
 
 
 def _of_gaps(plan: Plan, level_index: int) -> Iterator[Question]:
