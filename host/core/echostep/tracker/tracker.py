@@ -190,9 +190,14 @@ class Tracker:
         """Process many chunks; the estimates are the same as for the chunks one by one."""
         estimates: list[Estimate] = []
         for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, MEETING, PERSON):
-            estimates += self._track(piece)
-            if len(piece.of(TEAM_BEACONS).row):
-                self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
+            # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
+            estimates += self._published(self.front_end.process(piece))
+            # Beacons: bytes of the gateway -> readings, used from the next piece on.
+            if received := piece.of(GATEWAY).received:
+                self._readings += self.gateway.read(received, self.front_end.newest_s)
+            # Team: beacons that teammates have placed, meetings with them, check-ins.
+            if len((shared := piece.of(TEAM_BEACONS)).row):
+                self._team_beacons.receive(shared.received, len(self.plan.levels))
             self.watch.advance()
             for port, apply in ((MEETING, self._receive_meeting), (PERSON, self._apply_person)):
                 message = piece.of(port)
@@ -205,15 +210,6 @@ class Tracker:
         kernels.foot()
         kernels.board_and_clocks()
         self._new_filter(self.start or Start(), 0.0, np.random.default_rng(0)).update(kernels.measured())
-
-    def _track(self, portion: Portion) -> list[Estimate]:
-        """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
-        # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
-        estimates = self._published(self.front_end.process(portion))
-        # Beacons: bytes of the gateway -> readings.
-        if received := portion.of(GATEWAY).received:
-            self._readings += self.gateway.read(received, self.front_end.newest_s)
-        return estimates
 
     def _published(self, pieces: list[MeasuredSegment | Dropout]) -> list[Estimate]:
         """Estimates of new segments, and after dropouts."""
