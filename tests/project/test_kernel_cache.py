@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import echostep
-from echostep import jit, kernel_cache
+from echostep import kernel_cache
 from echostep.errors import EchostepError
 from echostep.jit import DAMAGED, CheckedFiles
 from echostep.kernel_cache import PACKAGE, cache_folder
@@ -227,7 +227,7 @@ def hurt(files: list[Path], damage: str) -> None:
 def test_a_damaged_file_is_put_aside_and_written_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, damage: str
 ) -> None:
-    jit._tell.cache_clear()
+    kernel_cache.tell.cache_clear()
     files, content = CheckedFiles(str(tmp_path), "k", "stamp"), list(range(1000))
     files.save("key", content)
     assert files.load("key") == content
