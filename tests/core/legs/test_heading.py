@@ -14,7 +14,7 @@ from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 
 
-def _shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
+def shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
     return np.array([h + iron.error(h) for h in heading.tolist()])
 
 
@@ -35,7 +35,7 @@ def _lap(seed: int, iron: CompassErrors) -> tuple[np.ndarray, np.ndarray, np.nda
         for p, q in zip(period, phase, strict=True)
     )
     machine = np.where((t > 40) & (t < 46), math.radians(90) * np.sin(math.pi * (t - 40) / 6), 0.0)
-    compass = np.where(np.arange(len(t)) % 20 == 0, _shown(heading, iron) + slow + machine, np.nan)
+    compass = np.where(np.arange(len(t)) % 20 == 0, shown(heading, iron) + slow + machine, np.nan)
     return t, heading, rate, np.angle(np.exp(1j * compass))
 
 
