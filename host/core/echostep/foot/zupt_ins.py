@@ -227,7 +227,9 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
         unrest.accumulate(s, nav, sample.gyro, level, dt)
-    stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
+    # The foot may still decelerate: by its acceleration over half the window
+    braking = (0.5 * stance.WINDOW_S) ** 2 * force2
+    stance.zero_velocity_update(nav, expected, variance + braking, dt)
     return True
 
 
