@@ -32,9 +32,8 @@ Fit = tuple[dict[str, Values], str]
 
 PIECE_S = 1.0  # a recording is divided into pieces of this length to find those at rest
 LEAST_PIECE_SAMPLES = 20
-STILL_SD_RAD_S = math.radians(
-    2.0
-)  # of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
+# Of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
+STILL_SD_RAD_S = math.radians(2.0)
 STILL_SPREAD_RAD_S = math.radians(1.0)  # largest distance of a piece's mean from the median of the means
 BIAS_MAX_RAD_S = math.radians(30.0)
 USUAL_BIAS_DEG_S = 5.0  # five standard deviations of parts at room temperature (1 degree/s, as simulated; assumed)

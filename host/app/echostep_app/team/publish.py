@@ -221,9 +221,8 @@ def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
     if alarm is None:
         return None
     age_s = now_s - alarm.since_s
-    return ReportedAlarm(
-        alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
-    )  # NaN before the first samples
+    age_s = min(age_s, 1e9) if age_s > 0.0 else 0.0  # NaN before the first samples
+    return ReportedAlarm(alarm.kind.value, alarm.reason.value, alarm.number, age_s)
 
 
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:
