@@ -190,9 +190,8 @@ def zero_inside(capture: bytes) -> bytes:
     return b"\0".join(frames)
 
 
-LINES: dict[
-    str, tuple[Callable[[bytes], bytes], int, int]
-] = {  # what is done to the bytes, frames lost, frames rejected beside those of the capture
+# What is done to the bytes, frames lost, frames rejected beside those of the capture
+LINES: dict[str, tuple[Callable[[bytes], bytes], int, int]] = {
     "nothing": (bytes, 0, 0),
     "one byte before [electricui-embedded, issue 180]": (lambda c: b"\x55" + c, 0, 1),
     "zeros before": (lambda c: bytes(50) + c, 0, 0),
