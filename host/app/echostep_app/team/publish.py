@@ -141,10 +141,8 @@ class Publishing:
         """Before the first estimate, report the streams every HEARTBEAT_S."""
         if now_s - self._offered_s >= HEARTBEAT_S:
             self._offered_s = now_s
-            alarm = self._last.alarm
-            self._offer(
-                replace(self._empty, alarm=alarm, streams=self._history_before_estimate.streams(self._tracker, now_s))
-            )
+            streams = self._history_before_estimate.streams(self._tracker, now_s)
+            self._offer(replace(self._empty, alarm=self._last.alarm, streams=streams))
 
     def end(self) -> None:
         """The run is over: the last reports go out, and receivers are told; returns at once. What does not go out is tried on."""
