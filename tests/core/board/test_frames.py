@@ -7,7 +7,6 @@ What serial lines add to a board's bytes costs the frames that it touches alone,
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 
@@ -20,6 +19,7 @@ from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, FrameCounts, StaleFirmwareError, crc, encode
 from naive.frames import BoardReader as NaiveReader
+from waiting import ran
 
 VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]
 CLASSES = {kind.__name__.lower(): kind for kind in m.BY_ID.values()}
@@ -58,9 +58,7 @@ def test_cobs_vectors(vector: dict[str, str]) -> None:
 
 @pytest.mark.process
 def test_generated_files_are_fresh() -> None:
-    done = subprocess.run(
-        [sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False
-    )
+    done = ran([sys.executable, ROOT / "protocol/generate.py", "--check"])
     assert done.returncode == 0, done.stdout
 
 
