@@ -1,5 +1,5 @@
 #!/bin/sh
-# One would expect the absolute trajectory error to compare poses of the same time, and to be zero for an estimate that is exact wherever it has a pose.
+# One would expect the absolute trajectory error to compare poses of the same time: zero for an estimate that is exact wherever it has a pose.
 # evalio takes two trajectories for synchronised if they have as many poses and begin alike, and compares the first with the first, and so on.
 # It hurts benchmarks: of exact estimates with a gap of 10 s, the one whose number of poses happens to be the truth's is 8.16 m off, not the others.
 # Where it does look at the time, an estimate faster than the truth gets the nearest pose however far it is: half the gap, here 5 s.

@@ -1,5 +1,5 @@
 #!/bin/sh
-# One would expect every reader of MCAP to find the messages of a file without what the specification makes optional: chunks, or their message indexes.
+# One would expect each reader of MCAP to find the messages of a file without what the specification makes optional: chunks, or message indexes.
 # Without chunks the indexed reader of @mcap/core and Rerun's converter give no message, and no error, though the statistics say five.
 # Without message indexes the former refuses the file. mcap 1.6.0, for Python, wrote both by its own options, and reads all five.
 # It hurts whoever writes message by message so that a crash loses nothing, or saves the 16 bytes a message: Foxglove's reader shows none of it.
@@ -46,6 +46,6 @@ python=$(env/bin/python write.py)
 indexed=$(node read.mjs | tr '\n' ' ')
 env/bin/rerun mcap convert flat.mcap -o flat.rrd >/dev/null 2>&1
 rows=$(env/bin/rerun rrd stats flat.rrd 2>/dev/null | sed -n 's/^num_rows_max = //p')
-echo "without chunks, without message indexes: mcap 1.6.0: $python; @mcap/core 2.2.2, indexed: $indexed; rerun-sdk 0.41.0: most rows of an entity: $rows"
+echo "without chunks; without message indexes: mcap 1.6.0: $python; @mcap/core 2.2.2: $indexed; rerun-sdk 0.41.0: most rows of an entity: $rows"
 refused="Encountered a chunk index without message indexes and non-zero start and end times"
 [ "$python$indexed$rows" = "5 5 0 of 5; $refused 1" ] || { echo "this has changed"; exit 1; }
