@@ -21,6 +21,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
+from echostep.legs.angle_grid import LONGEST_GAP_S
 
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
@@ -102,6 +103,7 @@ class Heading:
             self.state[HEADING] = heading_rad
         self.read = self.refused = 0
         self._t_s: float | None = None
+        self.unbroken_s = -math.inf  # first sample after the newest gap
         self._since_s = 0.0  # since P was propagated
         self._turned = 0.0  # by the gyro since the last reading of the compass
         self._last: tuple[float, float] | None = None  # time and heading of the last reading of the compass
@@ -138,15 +140,18 @@ class Heading:
         return CompassErrors(b, c, d, e)
 
     def _propagate(self, t_s: float, rate: float) -> None:
-        """Turn the heading by one rate; a missing one (NaN) inflates its variance."""
+        """Turn the heading by one rate; a missing one (NaN, or after a gap) inflates its variance."""
         if self._t_s is None or t_s <= self._t_s:
             self._t_s = t_s if self._t_s is None else self._t_s
             return
         dt, self._t_s = t_s - self._t_s, t_s
-        turned = 0.0 if math.isnan(rate) else (rate - float(self.state[BIAS])) * dt
+        if is_gap := dt > LONGEST_GAP_S:
+            self.unbroken_s = t_s
+        is_missing = is_gap or math.isnan(rate)
+        turned = 0.0 if is_missing else (rate - float(self.state[BIAS])) * dt
         self.state[HEADING] += turned
         self._turned += turned
-        if math.isnan(rate):
+        if is_missing:
             self.P[HEADING, HEADING] += MISSING_WALK_RAD**2 * dt
         elif not self._has_rate:
             self._start_gyro()
