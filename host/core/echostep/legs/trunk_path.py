@@ -107,6 +107,11 @@ class LegPath:
         times, headings = zip(*self._headings, strict=True)
         return float(np.interp(t_s, times, headings))
 
+    def unseen_sd_rad(self, t_s: float) -> float:
+        """How far the trunk may have turned, 1 sd, between a time and the nearest sample."""
+        times = np.array([t for t, _ in self._headings])
+        return MISSING_WALK_RAD * math.sqrt(float(np.abs(times - t_s).min()))
+
     def _stride_segment(self, stride: Stride) -> PathSegment | None:
         """The segment of a stride, without the time already covered by standing; None when nothing is left."""
         t0, t1 = max(stride.t_start_s, self._covered_s), stride.t_end_s
