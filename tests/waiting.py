@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Waiting for a condition."""
+"""Waiting for a condition, and for a program."""
 
 from __future__ import annotations
 
+import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 # Reached only by a test that fails: far more than anything takes while other programs have the cores
 PATIENCE_S = 120.0
@@ -27,3 +30,8 @@ def ends(work: Callable[[], object]) -> bool:
     thread.start()
     thread.join(PATIENCE_S)
     return not thread.is_alive()
+
+
+def ran(command: Sequence[str | Path], **more: Any) -> subprocess.CompletedProcess[str]:
+    """Exit status and output of a program that has run; `more` as for `subprocess.run`."""
+    return subprocess.run(command, capture_output=True, text=True, check=False, **more)

@@ -15,7 +15,7 @@ import pytest
 
 from board_runs import ELF, ROOT, needs_twin
 from reliability.fuzz import codec as fuzz_codec
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 FIRMWARE = ROOT / "firmware"
 CODEC = [FIRMWARE / name for name in ("cobs.c", "frame.c", "messages.c")]
@@ -44,7 +44,7 @@ static unsigned char out[600], payload[600];
 
 
 def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+    return ran([str(c) for c in command], timeout=TIMEOUT_S)
 
 
 def build(program: Path, compiler: str, sources: list[Path], *flags: str) -> Path:

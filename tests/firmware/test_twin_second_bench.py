@@ -180,9 +180,8 @@ def test_ghosts_of_the_schedules(bench: Bench, schedule: m.Schedule, crosses: bo
     assert len(found) > (130 if schedule == m.Schedule.SEQUENTIAL else 300)
     if schedule == m.Schedule.SIMULTANEOUS:
         fired = [np.array([p.ticks for p in found if p.ranger == side]) for side in m.Ranger]
-        assert (
-            np.abs(np.subtract.outer(*fired)).min(axis=0).max() < 3_000
-        )  # 1.5 ms: one transfer on the bus after the other
+        # 1.5 ms: one transfer on the bus after the other
+        assert np.abs(np.subtract.outer(*fired)).min(axis=0).max() < 3_000
 
 
 def test_a_ghost_after_a_silence_is_a_silence(bench: Bench) -> None:

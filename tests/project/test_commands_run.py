@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -32,6 +31,7 @@ from project.brought_files import (
     walk,
 )
 from project.test_docs import NOTEBOOK, PAGES, blocks, name_of
+from waiting import ran
 
 LEFT_OUT = {  # beginnings of commands, and why they are not run here
     "live": "ports",
@@ -133,5 +133,5 @@ INSTALLED = {line for page in PAGES for line in re.findall(r"pip install (\./hos
 def test_an_install_line_of_folders_installs(line: str) -> None:
     """Up to the dependencies, which need the network; lines for PyPI can be run when the packages are there (test_docs checks their extras)."""
     command = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-deps", "--no-index", "--no-build-isolation"]
-    done = subprocess.run([*command, *shlex.split(line)], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = ran([*command, *shlex.split(line)], cwd=ROOT)
     assert done.returncode == 0, f"pip install {line}\n{done.stderr}"

@@ -24,6 +24,7 @@ from command_line import PROGRAM, echostep
 from echostep_app import cli
 from echostep_app.extras import EXTRAS
 from project.brought_files import foot as foot_file
+from waiting import ran
 from walks import DEMO
 
 pytestmark = pytest.mark.process
@@ -119,7 +120,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 def run(core: dict[str, str], folder: Path, *words: object) -> subprocess.CompletedProcess[str]:
     """An echostep command in such a process."""
     command = [*PROGRAM, *map(str, words)]
-    return subprocess.run(command, env=core, cwd=folder, capture_output=True, text=True, check=False)
+    return ran(command, env=core, cwd=folder)
 
 
 def test_importing_loads_nothing_and_decoding_little(core: dict[str, str]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,12 +13,12 @@ from pathlib import Path
 import pytest
 
 import echostep
-from echostep import jit, kernel_cache
+from echostep import kernel_cache
 from echostep.errors import EchostepError
 from echostep.jit import DAMAGED, CheckedFiles
 from echostep.kernel_cache import PACKAGE, cache_folder
 from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 SHAPES = """
 from typing import NamedTuple
@@ -53,9 +52,7 @@ def run(package: Path, name: str, unit: float) -> str:
     (package / "shapes.py").write_text(SHAPES.format(name=name, unit=unit))
     command = [sys.executable, "-c", "import echostep.main"]
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False, env=environment
-    )
+    done = ran(command, timeout=5.0 * PATIENCE_S, env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -153,10 +150,8 @@ def test_a_user_who_cannot_write_the_folder_for_kernels_has_them_elsewhere(open_
     }
     environment |= {"NUMBA_CACHE_DIR": f"{open_path}/chosen"} if given == "/chosen" else {}
     for run_number in range(1 if given else 2):
-        done = subprocess.run(
-            [*AS_ANOTHER_USER, sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=5.0 * PATIENCE_S,
-            check=False, cwd="/", env={"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path), **environment},
-        )  # fmt: skip
+        env = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(sys.path), **environment}
+        done = ran([*AS_ANOTHER_USER, sys.executable, "-c", PROBE], timeout=5.0 * PATIENCE_S, cwd="/", env=env)
         assert done.returncode == 0, done.stderr
         kept = open_path / f"temporary/echostep-kernels-{ANOTHER_USER}"
         assert done.stdout.startswith(str(kept / "echostep_app/plan"))
@@ -193,9 +188,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 def start(folder: Path) -> tuple[list[str], str]:
     """What the module of this folder prints, and its errors."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": f"{folder}/cache"}
-    done = subprocess.run(
-        [sys.executable, "-m", "kept"], capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False, cwd=folder, env=environment,
-    )  # fmt: skip
+    done = ran([sys.executable, "-m", "kept"], timeout=5.0 * PATIENCE_S, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout.split(), done.stderr
 
@@ -227,7 +220,7 @@ def hurt(files: list[Path], damage: str) -> None:
 def test_a_damaged_file_is_put_aside_and_written_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, damage: str
 ) -> None:
-    jit._tell.cache_clear()
+    kernel_cache.tell.cache_clear()
     files, content = CheckedFiles(str(tmp_path), "k", "stamp"), list(range(1000))
     files.save("key", content)
     assert files.load("key") == content

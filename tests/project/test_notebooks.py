@@ -20,7 +20,7 @@ from packaging.requirements import Requirement
 import echostep
 from board_runs import ROOT
 from echostep_app.extras import EXTRAS
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 from walks import DEMO
 
 FOLDER = ROOT / "host/docs/notebooks"
@@ -122,7 +122,7 @@ def test_an_example_gives_what_it_says(name: str, tmp_path: Path, monkeypatch: p
 @pytest.mark.process
 def test_a_tiny_benchmark(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.speed.bench", "--tiny", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=10.0 * PATIENCE_S, check=False)
+    done = ran(command, timeout=10.0 * PATIENCE_S)
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "bench.json").read_text())
     assert len(rows) >= 8

@@ -18,7 +18,7 @@ from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from players import babbling_port
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 PYTHON = [sys.executable, "-m", "echostep"]
 MANUAL = (ROOT / "host/docs/page.md").read_text()
@@ -33,9 +33,7 @@ def test_the_unit_of_the_manual_is_one(tmp_path: Path) -> None:
     program.chmod(0o755)
     path = tmp_path / "echostep.service"
     path.write_text(unit.replace("/opt/echostep/bin/echostep", str(program)))
-    done = subprocess.run(
-        ["systemd-analyze", "verify", path], capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
+    done = ran(["systemd-analyze", "verify", path], timeout=PATIENCE_S)
     assert "echostep.service" not in done.stdout + done.stderr, done.stdout + done.stderr
 
 
@@ -114,9 +112,7 @@ def test_it_records_as_another_user_on_a_read_only_system(
             folders=f"{data} {kernels}", data=data, kernels=kernels, command=shlex.join(command), marker="echostep-test",
             environment=" ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items()),
         )  # fmt: skip
-        done = subprocess.run(
-            ["unshare", "--mount", "sh", "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, check=False
-        )
+        done = ran(["unshare", "--mount", "sh", "-c", script], timeout=PATIENCE_S)
     if done.returncode == 77:
         pytest.skip("this system lets nobody mount")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -13,7 +13,7 @@ import pytest
 
 from board_runs import ROOT
 from page.browser import opened_page
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 pytestmark = [pytest.mark.process, pytest.mark.long]
 
@@ -22,7 +22,7 @@ def build(source: Path, out: Path, *more: str) -> subprocess.CompletedProcess[st
     """`make site` with other folders."""
     options = ["-q", "-n", "-W", "--keep-going", "-c", str(ROOT / "tools/docs/manual"), "-d", str(out.parent / "cache")]
     command = [sys.executable, "-m", "sphinx", *options, *more, str(source), str(out)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
+    return ran(command, timeout=5.0 * PATIENCE_S)
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from board_runs import ROOT
 from command_line import echostep
 from foot.foot_walks import MANNERS, course, samples
 from release import wheel as wheels
+from waiting import ran
 from walks import DEMO
 
 pytestmark = pytest.mark.process
@@ -46,9 +47,7 @@ def metadata(wheel: Path) -> Message:
 @pytest.mark.long
 def test_pypi_takes_the_wheel_without_a_warning(built: Path) -> None:
     pytest.importorskip("twine")
-    done = subprocess.run(
-        [sys.executable, "-m", "twine", "check", "--strict", built], capture_output=True, text=True, check=False
-    )
+    done = ran([sys.executable, "-m", "twine", "check", "--strict", built])
     assert done.returncode == 0, done.stdout + done.stderr
     assert "PASSED" in done.stdout
 
@@ -171,9 +170,7 @@ def test_the_core_alone_decodes_tracks_and_navigates_a_foot(core: tuple[Path, di
 
 def test_the_core_alone_names_a_mistake_in_one_line(core: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
     programs, env = core
-    done = subprocess.run(
-        [programs / "echostep", "foot", "no.csv"], env=env, cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = ran([programs / "echostep", "foot", "no.csv"], env=env, cwd=tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert done.stderr.startswith("echostep: no.csv: cannot read")
     assert "echostep[app]" in wheels.run([programs / "echostep", "--help"], env, tmp_path)

@@ -98,9 +98,8 @@ def test_an_ellipse_holds_what_is_within_it_on_the_right_floor() -> None:
     true_m = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 0.24], [0.0, 0.0], [0.0, 0.0]])
     right = np.array([[True], [True], [True], [False], [True]])
     assert judge(claims, TruePlaces(true_m, right), np.zeros(5)).in_ellipse.tolist() == [True, False, True, False]
-    wide = Claim(
-        0.0, 5.0, 0.0, 0, 0.0, TRACKING, math.inf, covariance_m2=(9.0, 0.0, 9.0)
-    )  # further off than a storey is high
+    # Further off than a storey is high
+    wide = Claim(0.0, 5.0, 0.0, 0, 0.0, TRACKING, math.inf, covariance_m2=(9.0, 0.0, 9.0))
     assert [
         judge([wide], TruePlaces(np.zeros((1, 2)), floor), np.zeros(1)).in_ellipse.tolist()
         for floor in (right[:1], right[3:4])

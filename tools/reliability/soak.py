@@ -122,7 +122,7 @@ class WalkPorts:
             yield chunk
 
     def _look(self) -> None:
-        t_s, status = self._walk.t_s, self._tracker.streams.status
+        t_s, status = self._walk.t_s, self._tracker.streams.reports.status
         self._measured.memory.append((t_s, resident_mb("self"), resident_mb(str(self._board.pid))))
         if status is not None:
             self._measured.clock.append((t_s, status.ticks))
@@ -173,7 +173,7 @@ def run(seconds: float, folder: Path, wrap: int, before_s: float = BEFORE_WRAP_S
 def losses(tracker: Tracker, recorder: Recorder) -> dict[str, int]:
     """Everything that counts a loss, of board, MTx, host and recorder, by name."""
     streams = tracker.streams
-    status = streams.status._asdict() if streams.status else {}
+    status = streams.reports.status._asdict() if streams.reports.status else {}
     counts = {f"board: {name}": count for name, count in status.items() if "dropped" in name}
     counts |= {"board: frames lost": streams.board.lost, "board: frames rejected": streams.board.rejected}
     counts |= {f"MTx: {name}": count for name, count in asdict(streams.mtx).items() if name != "good"}

@@ -21,7 +21,7 @@ import sys
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numba
@@ -31,7 +31,7 @@ from numba.core.caching import IndexDataCacheFile
 from numba.extending import models, register_model, typeof_impl
 from numba.np import linalg
 
-from echostep.kernel_cache import cache_folder, on_compiling
+from echostep.kernel_cache import cache_folder, on_compiling, tell
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -141,7 +141,7 @@ class CheckedFiles(_Files):  # type: ignore[misc]
         try:
             super().save(key, data)
         except OSError as error:
-            _tell(f"{UNWRITTEN}: {error.strerror or error}: {self._cache_path}")
+            tell(f"{UNWRITTEN}: {error.strerror or error}: {self._cache_path}")
 
     def _load_index(self) -> dict[Any, str]:
         """The kernel's versions, by their types; empty where the file is absent, of another numba or another source, or damaged."""
@@ -186,7 +186,7 @@ def _is_of_another_numba(index: bytes) -> bool:
 
 def _put_aside(path: str) -> None:
     """Rename a damaged file; where that fails, its kernel is compiled again at each start."""
-    _tell(DAMAGED)
+    tell(DAMAGED)
     with suppress(OSError):
         os.replace(path, path + ASIDE)  # noqa: PTH105
 
@@ -196,12 +196,6 @@ def check_files(dispatcher: Any) -> None:
     files = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if type(files) is IndexDataCacheFile:
         files.__class__ = CheckedFiles
-
-
-@cache
-def _tell(sentence: str) -> None:
-    """Print a sentence once a run."""
-    print(f"echostep: {sentence}", file=sys.stderr)
 
 
 class _Compilations(event.Listener):

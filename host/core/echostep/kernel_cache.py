@@ -63,7 +63,8 @@ def _folder(package: Path, root: Path, name: str) -> Path:
     folder = folder or _temporary_folder() / inside / name
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen and not folder.is_relative_to(chosen):
-        _tell_of_other_folder(chosen, root if folder.is_relative_to(root) else folder.parents[len(inside.parts)])
+        used = root if folder.is_relative_to(root) else folder.parents[len(inside.parts)]
+        tell(f"NUMBA_CACHE_DIR: {chosen} cannot be written: compiled kernels are kept in {used}")
     return folder
 
 
@@ -83,11 +84,9 @@ def _can_be_written(folder: Path) -> bool:
 
 
 @cache
-def _tell_of_other_folder(chosen: str, used: Path) -> None:
-    """Report the other folder, once a run."""
-    print(
-        f"echostep: NUMBA_CACHE_DIR: {chosen} cannot be written: compiled kernels are kept in {used}", file=sys.stderr
-    )
+def tell(sentence: str) -> None:
+    """Print a sentence once a run."""
+    print(f"echostep: {sentence}", file=sys.stderr)
 
 
 @cache
@@ -114,20 +113,14 @@ def _temporary_folder() -> Path:
         raise EchostepError("no folder for compiled kernels can be written: give one in NUMBA_CACHE_DIR") from error
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-        print(
-            f"echostep: the user has no cache folder that can be written: compiled kernels are kept in {folder}",
-            file=sys.stderr,
-        )
+        tell(f"the user has no cache folder that can be written: compiled kernels are kept in {folder}")
     state = folder.lstat()
     if not hasattr(os, "getuid"):  # Windows: the temporary folder is the user's own
         return folder
     if stat.S_ISDIR(state.st_mode) and state.st_uid == owner and not state.st_mode & 0o022:
         return folder
     made = Path(tempfile.mkdtemp(prefix="echostep-kernels-"))
-    print(
-        f"echostep: kernels are compiled for this run alone, in {made}: give a folder in NUMBA_CACHE_DIR",
-        file=sys.stderr,
-    )
+    tell(f"kernels are compiled for this run alone, in {made}: give a folder in NUMBA_CACHE_DIR")
     return made
 
 

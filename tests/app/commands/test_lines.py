@@ -35,7 +35,7 @@ from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineR
 from foot.foot_walks import MANNERS, course, samples
 from free_ports import free_port
 from players import pseudo_terminal
-from waiting import until
+from waiting import ran, until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
 DEVICE = """
@@ -138,9 +138,7 @@ def test_a_live_run_without_a_board_is_replayed_bit_for_bit(walk: Path, tmp_path
     (tmp_path / "lines.csv").write_text("".join(f"{line}\n" for line in lines(walk)))
     device_command = [sys.executable, "-c", DEVICE, str(tmp_path / "lines.csv")]
     with subprocess.Popen(device_command, stdout=subprocess.PIPE) as device:
-        done = subprocess.run(
-            [*PROGRAM, *map(str, live)], check=False, stdin=device.stdout, capture_output=True, text=True
-        )
+        done = ran([*PROGRAM, *map(str, live)], stdin=device.stdout)
     assert done.returncode == 0, done.stderr
     assert "foot in lines: 100 Hz; 0 lines were no sample" in done.stdout
     again = run("replay", tmp_path / "walk.mcap", "--plan", plan, "--headless", "--out", tmp_path / "again")

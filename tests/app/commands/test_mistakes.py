@@ -174,9 +174,8 @@ WITH_PROCESS = (*WITH_BROKER, "the plan has a format that cannot be read")
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings(
-    "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # paho leaves a socket that failed to shake hands to the collector
+# Paho leaves a socket that failed to shake hands to the collector
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize(
     "mistake", [pytest.param(name, marks=pytest.mark.process if name in WITH_PROCESS else ()) for name in MISTAKES]
 )

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from echostep.recording import open_recording
 from echostep_studies.bench.recordings.hallways import names_in, read_hallway
 from echostep_studies.frame.recordings import DATA
 from needs_data import needs_data
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 pytestmark = needs_data("gx5_gcp")
 
@@ -22,7 +21,7 @@ pytestmark = needs_data("gx5_gcp")
 @pytest.mark.process
 def test_the_real_walk_is_tracked_within_its_target(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "echostep_studies.figures.real_walk", "--out", str(tmp_path), "--seed", "3"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=5.0 * PATIENCE_S, check=False)
+    done = ran(command, timeout=5.0 * PATIENCE_S)
     assert done.returncode == 0, done.stdout + done.stderr  # 1 when the RMSE is above 0.30 m
     assert "foot real" in done.stdout
     assert "echoes simulated" in open_recording(tmp_path / "walk.mcap").metadata["note"]

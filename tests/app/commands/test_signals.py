@@ -22,6 +22,7 @@ from echostep.ports.chunks import Chunk
 from echostep.recording import MCAP_MAGIC, open_recording
 from echostep_app.interruption import end_by_signals, holding_signals, is_asked, sleep, wait_for
 from echostep_app.recording.recorder import Recorder
+from operation.crowd import child_cpu_s
 from players import python_board
 from waiting import PATIENCE_S, until
 from walks import DEMO as PLAN
@@ -177,15 +178,9 @@ def _recorded(out: Path) -> int:
 
 def _cost(out: Path, pid: int) -> float:
     """Processor time (s) that the program takes to record a byte, over COST_BYTES."""
-    began, cpu_s = _recorded(out), _cpu_s(pid)
+    began, cpu_s = _recorded(out), child_cpu_s(pid)
     assert until(lambda: _recorded(out) > began + COST_BYTES)
-    return (_cpu_s(pid) - cpu_s) / (_recorded(out) - began)
-
-
-def _cpu_s(pid: int) -> float:
-    """Processor time of a process, all its threads: utime and stime [proc(5)]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return (child_cpu_s(pid) - cpu_s) / (_recorded(out) - began)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

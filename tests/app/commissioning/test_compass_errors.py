@@ -8,14 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.legs.heading import CompassErrors
 from echostep_app.commissioning.fitting import fit_compass_errors
-
-IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
-
-
-def _shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
-    return np.array([h + iron.error(h) for h in heading.tolist()])
+from legs.test_heading import IRON, shown
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -24,7 +18,7 @@ def test_iron_is_found_by_a_turn_on_the_spot(sign: float) -> None:
     t = np.arange(0.0, 25.0, 0.01)
     heading = 1.0 + sign * 0.35 * t
     rate = np.gradient(heading, t) + math.radians(0.8) + 0.01 * rng.standard_normal(len(t))
-    compass = np.where(np.arange(len(t)) % 10 == 0, _shown(heading, IRON) + 0.01 * rng.standard_normal(len(t)), np.nan)
+    compass = np.where(np.arange(len(t)) % 10 == 0, shown(heading, IRON) + 0.01 * rng.standard_normal(len(t)), np.nan)
     found = fit_compass_errors(t, rate, np.angle(np.exp(1j * compass)))
     error = [found.error(h) - IRON.error(h) for h in np.linspace(0, 2 * math.pi, 36)]
     assert np.ptp(error) < math.radians(2.0)

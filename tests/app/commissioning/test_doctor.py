@@ -71,9 +71,8 @@ def test_a_board_that_has_just_started_is_not_called_faulty(heard_ms: int) -> No
         bench.board.close()
     report = Diagnosis()
     judge_board(report, running.result, "x")
-    clock = [
-        finding for finding in report.findings if "clock" in finding.what
-    ]  # compares the simulated with this computer's
+    # Compares the simulated with this computer's
+    clock = [finding for finding in report.findings if "clock" in finding.what]
     assert [str(f) for f in report.findings if f.severity > Severity.NOTE and f not in clock] == []
 
 

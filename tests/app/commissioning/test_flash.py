@@ -25,7 +25,7 @@ from echostep.board.frames import encode
 from echostep_app.commissioning.flash import check_digest, check_hex
 from players import pseudo_terminal
 from snapshots import expect, refusal
-from waiting import PATIENCE_S
+from waiting import PATIENCE_S, ran
 
 SHIPPED = ROOT / "host/app/echostep_app/firmware/echostep.hex"
 AVRDUDE = """#!/bin/sh
@@ -136,7 +136,7 @@ def test_a_board_that_does_not_react_is_told_after_ten_seconds(tmp_path: Path) -
 def make_flash(port: object, path: str, *more: object) -> subprocess.CompletedProcess[str]:
     """`make flash` without make: the script that it runs, with these programs alone."""
     command = list(map(str, ["/bin/sh", ROOT / "tools/flash.sh", port, *more]))
-    return subprocess.run(command, env={"PATH": path}, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    return ran(command, env={"PATH": path}, timeout=PATIENCE_S)
 
 
 @pytest.mark.process

@@ -109,9 +109,8 @@ def test_motion_before_the_walk_does_not_fix_the_signs(walked: Walk) -> None:
     t_s, thigh, shank = (c[::10] for c in (walked.t_s, walked.thigh_rad_s, walked.calf_rad_s))
     before_s = np.arange(0.0, 6.0, 0.01)
     lifts = np.clip(np.minimum(before_s - 1.0, 4.5 - before_s), 0.0, 0.3) * np.sin(2.0 * math.pi * 0.8 * before_s)
-    joined = [
-        np.concatenate([k * lifts, c]) for c, k in ((thigh, -6.0), (shank, 9.0))
-    ]  # the foot drawn back, knee bent
+    # The foot drawn back, knee bent
+    joined = [np.concatenate([k * lifts, c]) for c, k in ((thigh, -6.0), (shank, 9.0))]
     times = np.arange(0.0, len(joined[0])) * 0.01
     nothing = np.full(len(times), np.nan)
     live = StrideEstimator()

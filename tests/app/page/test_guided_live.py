@@ -149,6 +149,5 @@ def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[
     assert (tmp_path / "again/cues.csv").read_bytes() == cues
     truth = np.genfromtxt(tmp_path / "truth.csv", delimiter=",", names=True)
     end = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))[-1]
-    assert (
-        np.hypot(float(end["x_m"]) - truth["x"][-1], float(end["y_m"]) - truth["y"][-1]) < 1.3
-    )  # a metre before it is there
+    # A metre before it is there
+    assert np.hypot(float(end["x_m"]) - truth["x"][-1], float(end["y_m"]) - truth["y"][-1]) < 1.3

@@ -180,9 +180,8 @@ def test_nothing_is_cut_off_on_the_commanders_page(browser: Any, lang: str) -> N
     crew = Crew(1, "c" * 8, "Attack 1", ("Anna",), 30.0, "Ann", team.unix_s, team.unix_s - 1300.0)
     team.put_bytes(*crew.message)
     with ServedTeam(team) as table, page_of(browser, table.page.url, lang, TABLE_READY) as page:
-        page.keyboard.press(
-            "Shift"
-        )  # no click on the invitation: where a script was evaluated before it was made, that counted as a gesture
+        # No click on the invitation: where a script was evaluated before it was made, that counted as a gesture
+        page.keyboard.press("Shift")
 
         def check() -> None:
             assert settles(page), page.evaluate(CUT)

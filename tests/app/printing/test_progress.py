@@ -22,7 +22,7 @@ from echostep_app import kernel_parts
 from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.printing import progress
 from echostep_app.printing.compiling import COMPILING, counting_compiled, tell_of_compiling
-from waiting import PATIENCE_S, until
+from waiting import PATIENCE_S, ran, until
 
 
 @pytest.mark.parametrize("terminal", [True, False])
@@ -115,14 +115,7 @@ beacons()
 def run(folder: Path) -> str:
     """What a run prints of the kernels that it compiles by itself, with a cache in this folder."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-c", RUN],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=20 * PATIENCE_S,
-        check=False,
-    )
+    done = ran([sys.executable, "-c", RUN], env=environment, timeout=20 * PATIENCE_S)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

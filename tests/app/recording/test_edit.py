@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import gzip
 import struct
-import subprocess
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -32,6 +31,7 @@ from echostep_app.recording.recorder import DerivedMessage, Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import cut, repair
 from snapshots import expect
+from waiting import ran
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
 FIXTURE = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -231,12 +231,7 @@ def test_a_full_disk_under_a_piece_is_named(tmp_path: Path) -> None:
         "sys.argv = ['echostep', 'repair', sys.argv[1], '-o', sys.argv[2]]\n"
         "from echostep_app.cli import main; main()"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", limited, tmp_path / "a.mcap", tmp_path / "b.mcap"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran([sys.executable, "-c", limited, tmp_path / "a.mcap", tmp_path / "b.mcap"])
     assert (done.returncode, done.stderr) == (2, f"echostep: {tmp_path}/b.mcap: cannot write: File too large\n")
     assert not (tmp_path / "b.mcap").exists()
 

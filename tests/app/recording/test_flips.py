@@ -14,7 +14,7 @@ import pytest
 from echostep.localization import Estimate
 from echostep.particles.limits import TRACKING_M
 from echostep.plan import load_plan
-from echostep.ports.chunks import Chunk, portion_of
+from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
 from echostep.recording.mcap_records import HEAD_SIZE
 from echostep.tracker import Tracker
@@ -32,15 +32,11 @@ from recording.damages import (
     replay,
     write_recording,
 )
+from timing.test_disturbed_clocks import track
 from walks import DEMO, walk_chunks
 
 SECONDS = 8.0
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
-
-
-def track(chunks: tuple[Chunk, ...]) -> tuple[list[Estimate], Tracker]:
-    tracker = Tracker(load_plan(DEMO), None, None, 1)
-    return tracker.take(portion_of(chunks)), tracker
 
 
 @cache

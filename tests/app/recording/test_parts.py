@@ -166,9 +166,8 @@ def chunks_of(*paths: Path) -> list[Chunk]:
 def test_each_part_is_a_whole_recording_and_all_replay_as_one(tmp_path: Path, limit: SplitLimit) -> None:
     parts = record_parts(tmp_path, limit)
     assert len(parts) >= 4
-    assert re.fullmatch(
-        r"walk-0001-\d{8}T\d{6}Z-part0002\.mcap", parts[0].name
-    )  # the first one has no number: it sorts behind
+    # The first one has no number: it sorts behind
+    assert re.fullmatch(r"walk-0001-\d{8}T\d{6}Z-part0002\.mcap", parts[0].name)
     assert all(info(part)[-1] == "  whole" for part in parts)
     together = [chunk for part in [parts[-1], *parts[:-1]] for chunk in open_recording(part).chunks()]
     assert together == CHUNKS

@@ -27,7 +27,7 @@ from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.recovery import Recovery
 from recording.damages import read_by_index, write_recording
-from waiting import PATIENCE_S, until
+from waiting import PATIENCE_S, ran, until
 from walks import DEMO
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * (n % 40 + 1)) for n in range(300)]
@@ -182,7 +182,7 @@ console.log(count);
 
 
 def run(*words: str | Path, cwd: Path) -> str:
-    done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False, cwd=cwd)
+    done = ran([*map(str, words)], cwd=cwd)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -69,9 +69,8 @@ def errors_m(folder: Path, plan: Path) -> Floats:
 def test_the_figures_are_those_of_the_simulated_truth(tmp_path: Path, plan: Path) -> None:
     card, expected = scored(tmp_path, plan, [stand.tap() for stand in stands()]), errors_m(tmp_path, plan)
     assert card["points"] == len(stands()) == 4
-    assert card["horizontal"]["mean_m"] == pytest.approx(
-        expected.mean(), abs=0.02
-    )  # the board's clock begins with its first sample
+    # The board's clock begins with its first sample
+    assert card["horizontal"]["mean_m"] == pytest.approx(expected.mean(), abs=0.02)
     assert card["horizontal"]["max_m"] == pytest.approx(expected.max(), abs=0.02)
     assert card["horizontal"]["mean_m"] < 0.2
     assert card["floor_probability"] == card["availability"] == 1.0

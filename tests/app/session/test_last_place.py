@@ -20,7 +20,7 @@ from echostep.localization import Estimate, Start, TrackStatus
 from echostep.plan import NO_PLAN, Pose
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import LastPlace, last_place
+from echostep.tracker.state import LastPlace
 from echostep.walk.recorded import recorded_start
 from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import parse_start, run_metadata
@@ -77,9 +77,9 @@ def test_a_disk_that_refuses_stops_nothing(tmp_path: Path) -> None:
 
 def test_only_a_sure_estimate_is_a_last_place() -> None:
     air = Air(99.5, 0.125)
-    assert last_place(SURE, air) == PLACE
-    assert last_place(replace(SURE, status=TrackStatus.UNCERTAIN), air) is None
-    assert last_place(None, air) is None
+    assert LastPlace.of(SURE, air) == PLACE
+    assert LastPlace.of(replace(SURE, status=TrackStatus.UNCERTAIN), air) is None
+    assert LastPlace.of(None, air) is None
 
 
 def test_the_same_board_carries_the_pressure_over() -> None:

@@ -30,9 +30,8 @@ from page.browser import PLAN, demo_walk
 from page.frames import told
 from waiting import PATIENCE_S
 
-TRACKER: Any = SimpleNamespace(
-    plan=load_plan(ROOT / "host/core/echostep/plans/demo.json"), beacon_places=lambda _: []
-)  # what the results ask of a tracker
+# What the results ask of a tracker
+TRACKER: Any = SimpleNamespace(plan=load_plan(ROOT / "host/core/echostep/plans/demo.json"), beacon_places=lambda _: [])
 
 
 def test_track_and_summary_come_before_the_picture(

@@ -140,9 +140,8 @@ def test_two_trackers_of_one_name_do_not_throw_each_other_out(tmp_path: Path) ->
 
 
 @needs_broker
-@pytest.mark.filterwarnings(
-    "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # paho leaves a socket that failed to shake hands to the collector
+# Paho leaves a socket that failed to shake hands to the collector
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_tls_with_client_certificates(tmp_path: Path, certificates: Certificates) -> None:
     c = certificates
     asked = (f"cafile {c.ca}", f"certfile {c.server}", f"keyfile {c.server}", "require_certificate true")

@@ -7,7 +7,6 @@ What serial lines add to a board's bytes costs the frames that it touches alone,
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 
@@ -20,6 +19,7 @@ from board_runs import ROOT
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, FrameCounts, StaleFirmwareError, crc, encode
 from naive.frames import BoardReader as NaiveReader
+from waiting import ran
 
 VECTORS = [json.loads(line) for line in (ROOT / "protocol/vectors.jsonl").read_text().splitlines()]
 CLASSES = {kind.__name__.lower(): kind for kind in m.BY_ID.values()}
@@ -58,9 +58,7 @@ def test_cobs_vectors(vector: dict[str, str]) -> None:
 
 @pytest.mark.process
 def test_generated_files_are_fresh() -> None:
-    done = subprocess.run(
-        [sys.executable, ROOT / "protocol/generate.py", "--check"], capture_output=True, text=True, check=False
-    )
+    done = ran([sys.executable, ROOT / "protocol/generate.py", "--check"])
     assert done.returncode == 0, done.stdout
 
 
@@ -190,9 +188,8 @@ def zero_inside(capture: bytes) -> bytes:
     return b"\0".join(frames)
 
 
-LINES: dict[
-    str, tuple[Callable[[bytes], bytes], int, int]
-] = {  # what is done to the bytes, frames lost, frames rejected beside those of the capture
+# What is done to the bytes, frames lost, frames rejected beside those of the capture
+LINES: dict[str, tuple[Callable[[bytes], bytes], int, int]] = {
     "nothing": (bytes, 0, 0),
     "one byte before [electricui-embedded, issue 180]": (lambda c: b"\x55" + c, 0, 1),
     "zeros before": (lambda c: bytes(50) + c, 0, 0),

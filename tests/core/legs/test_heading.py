@@ -14,7 +14,7 @@ from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 
 
-def _shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
+def shown(heading: np.ndarray, iron: CompassErrors) -> np.ndarray:
     return np.array([h + iron.error(h) for h in heading.tolist()])
 
 
@@ -35,7 +35,7 @@ def _lap(seed: int, iron: CompassErrors) -> tuple[np.ndarray, np.ndarray, np.nda
         for p, q in zip(period, phase, strict=True)
     )
     machine = np.where((t > 40) & (t < 46), math.radians(90) * np.sin(math.pi * (t - 40) / 6), 0.0)
-    compass = np.where(np.arange(len(t)) % 20 == 0, _shown(heading, iron) + slow + machine, np.nan)
+    compass = np.where(np.arange(len(t)) % 20 == 0, shown(heading, iron) + slow + machine, np.nan)
     return t, heading, rate, np.angle(np.exp(1j * compass))
 
 
@@ -74,3 +74,16 @@ def test_without_compass_it_counts_from_zero_and_says_how_well() -> None:
     found = Heading(HeadingSettings()).feed(t, np.full_like(t, 0.1), np.full_like(t, np.nan))
     assert found[-1, 0] == pytest.approx(0.1 * 59.99, rel=1e-6)
     assert found[-1, 1] > math.radians(45)
+
+
+@pytest.mark.parametrize("has_compass", [True, False])
+def test_a_gap_is_not_turned_through_at_the_rate_after_it(has_compass: bool) -> None:
+    """Three seconds are missing in a turn: the compass then gives the heading at once; without one it is as before, and unsure."""
+    t = np.concatenate([np.arange(0.0, 5.0, 0.01), np.arange(8.0, 12.0, 0.01)])
+    true, turning = np.where(t < 6.0, 0.0, 1.5), np.where(abs(t - 6.5) < 1.6, 1.0, 0.0)
+    compass = np.where(np.arange(len(t)) % 10 == 0, true if has_compass else np.nan, np.nan)
+    ours = Heading()
+    found = ours.feed(t, turning, compass)
+    assert found[510:, 0] == pytest.approx(np.full(len(t) - 510, 1.5 if has_compass else 0.0) + 0.09, abs=0.15)
+    assert found[500, 1] > 0.5
+    assert ours.unbroken_s >= 8.0

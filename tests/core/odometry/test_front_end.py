@@ -102,8 +102,7 @@ def taken(chunks: list[Chunk], cuts: list[int]) -> tuple[Told, tuple[object, ...
         ours.counts,
         ours.board.counts,
         ours.foot_source.counts,
-        ours.status,
-        ours.identity,
+        ours.reports,
         ours.timeline.synchronised,
         {name: b"".join(parts) for name, parts in watch.told.items()},
     )
@@ -126,8 +125,8 @@ def test_the_recorded_walk_has_all_that_matters() -> None:
     assert ours.counts.unknown_ports > 5
     assert ours.board.counts.rejected > 10
     assert ours.foot_source.counts.bad_checksum > 5
-    assert ours.status is not None
-    assert ours.identity is not None
+    assert ours.reports.status is not None
+    assert ours.reports.identity is not None
 
 
 @pytest.mark.slow

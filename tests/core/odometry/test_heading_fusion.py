@@ -80,23 +80,26 @@ def blocks(t_s: Floats, rate: Floats) -> Iterator[GyroBlock]:
         yield GyroBlock(t_s[k : k + 20], none, none, rate[k : k + 20], none)
 
 
-def walked(
-    walker: Walker, change: Change = lambda _, rate: rate, at_s: Floats | None = None, first: Stance | None = None
-) -> tuple[HeadingFusion, list[Step]]:
+def fused(fusion: HeadingFusion, coming: Iterator[GyroBlock], events: Iterable[Step | Stance]) -> Iterator[Step]:
     """The steps with the belt's help: each event comes 0.15 s after its end, each block at its last sample."""
-    fusion, steps = HeadingFusion(), []
-    t_s, rate = walker.belt()
-    rate = change(t_s, rate)
-    coming = blocks(t_s if at_s is None else at_s, rate)
     block = next(coming, None)
-    for event in [*([first] if first else []), *walker.events()]:
+    for event in events:
         while block is not None and not block.t_s[-1] > event.t_end_s + 0.15:
             fusion.add_belt(block)
             block = next(coming, None)
         found = fusion.corrected(event)
         if isinstance(found, Step):
-            steps.append(found)
-    return fusion, steps
+            yield found
+
+
+def walked(
+    walker: Walker, change: Change = lambda _, rate: rate, at_s: Floats | None = None, first: Stance | None = None
+) -> tuple[HeadingFusion, list[Step]]:
+    """The steps with the belt's help, and what gave it."""
+    fusion = HeadingFusion()
+    t_s, rate = walker.belt()
+    coming = blocks(t_s if at_s is None else at_s, change(t_s, rate))
+    return fusion, list(fused(fusion, coming, [*([first] if first else []), *walker.events()]))
 
 
 def errors(walker: Walker, steps: list[Step]) -> Floats:
@@ -131,23 +134,16 @@ def told(events: Iterable[Step | Stance]) -> list[tuple[object, ...]]:
 
 def segments_of(walker: Walker, change: Change = lambda _, rate: rate) -> list[MeasuredSegment]:
     """The walk's segments as the front end makes them, from the middle of one stance to that of the next."""
-    fusion, found = HeadingFusion(), list[MeasuredSegment]()
+    fusion, found, before = HeadingFusion(), list[MeasuredSegment](), 0.0
     t_s, rate = walker.belt()
-    coming = blocks(t_s, change(t_s, rate))
-    block, before = next(coming, None), 0.0
-    for event in walker.events():
-        while block is not None and not block.t_s[-1] > event.t_end_s + 0.15:
-            fusion.add_belt(block)
-            block = next(coming, None)
-        step = fusion.corrected(event)
-        if isinstance(step, Step):
-            t1 = step.t_end_s + 0.25
-            segment = PathSegment(
-                t1 - STRIDE_S, t1, step.move_m[0], step.move_m[1], before, step.heading_rad, 0.02, step.heading_sd_rad,
-                len(found), belt=fusion.evidence,
-            )  # fmt: skip
-            found.append(MeasuredSegment(segment, np.zeros(0), np.zeros(0, np.int64), np.zeros(0)))
-            before = step.heading_rad
+    for step in fused(fusion, blocks(t_s, change(t_s, rate)), walker.events()):
+        t1 = step.t_end_s + 0.25
+        segment = PathSegment(
+            t1 - STRIDE_S, t1, step.move_m[0], step.move_m[1], before, step.heading_rad, 0.02, step.heading_sd_rad,
+            len(found), belt=fusion.evidence,
+        )  # fmt: skip
+        found.append(MeasuredSegment(segment, np.zeros(0), np.zeros(0, np.int64), np.zeros(0)))
+        before = step.heading_rad
     return found
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -132,7 +133,7 @@ def test_crystals_200_ppm_apart_that_drift_with_temperature(ppm: float, wired: b
     assert np.abs(found[1::2] - t)[3_000:].max() < (1e-5 if wired else 1.5e-3)
 
 
-def track(chunks: list[Chunk]) -> tuple[list[Estimate], Tracker]:
+def track(chunks: Sequence[Chunk]) -> tuple[list[Estimate], Tracker]:
     tracker = Tracker(load_plan(DEMO), None, None, 1)
     return tracker.take(portion_of(chunks)), tracker
 

@@ -93,7 +93,7 @@ def test_a_foot_that_falls_silent_is_never_shown_as_sure() -> None:
     tracker, found = track([c for c in CHUNKS if c.port == BOARD or c.t_arrival_ns < half_ns])
     assert not sure_but_wrong(found, SCENARIO)
     assert found[-1].t_s > END_S - 3.0
-    assert tracker.front_end.status is not None
+    assert tracker.front_end.reports.status is not None
 
 
 def sure_but_wrong(found: list[Estimate], scenario: Scenario) -> list[Estimate]:

@@ -170,9 +170,8 @@ def test_the_layout_is_the_one_of_the_manual() -> None:
     values, counter, _ = decode_mtdata(np.frombuffer(payload, np.uint8)[None, :], output)
     assert values[0, :9].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]
     assert (values[0, CELSIUS], counter[0]) == (21.5, 4660)
-    assert np.allclose(
-        values[0, ATTITUDE], [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
-    )  # x to y: a quarter turn to the left
+    # X to y: a quarter turn to the left
+    assert np.allclose(values[0, ATTITUDE], [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 
 
 def test_fixed_point_is_12_20() -> None:

@@ -149,9 +149,8 @@ def test_bad_samples_are_counted_and_change_nothing() -> None:
     clean = fischer2008.walk_track(t, accel, gyro, matrices)
     places = [50, 300, 301, 500]
     bad_t, bad_accel = np.insert(t, places, t[places]), np.insert(accel, places, np.nan, axis=0)
-    bad_accel[50] = accel[
-        49
-    ]  # this one is possible, but not later: the sample behind it, of the same time, is left out
+    # This one is possible, but not later: the sample behind it, of the same time, is left out
+    bad_accel[50] = accel[49]
     dirty = fischer2008.walk_track(
         bad_t,
         bad_accel,

@@ -43,9 +43,8 @@ def test_step_3_draws_uniformly_in_the_disc() -> None:
     errors = disc(np.random.default_rng(2), 20_000, 0.25)
     radius = np.hypot(*errors.T)
     assert radius.max() <= 0.25
-    assert np.mean(radius < 0.25 * math.sqrt(0.5)) == pytest.approx(
-        0.5, abs=0.02
-    )  # half of the area holds half of them
+    # Half of the area holds half of them
+    assert np.mean(radius < 0.25 * math.sqrt(0.5)) == pytest.approx(0.5, abs=0.02)
     assert np.abs(errors.mean(0)).max() < 0.005
 
 

@@ -132,11 +132,8 @@ def _pictured(plan: Plan, out: Path) -> str:
 
 def _without(letters: str) -> str:
     """Words on letters that were drawn as boxes; empty when there are none."""
-    return (
-        f"; no font here has the letters {letters[:40]}: install one that does (fonts-noto-cjk, fonts-noto)"
-        if letters
-        else ""
-    )
+    remedy = "install one that does (fonts-noto-cjk, fonts-noto)"
+    return f"; no font here has the letters {letters[:40]}: {remedy}" if letters else ""
 
 
 PlanFile = Annotated[Path, typer.Argument(metavar="PLAN", help="A plan (JSON), or what can be imported.")]

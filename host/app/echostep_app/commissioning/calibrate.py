@@ -107,7 +107,8 @@ def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console
         probed = _probe(str(ports.board), seconds, f"Listening for {seconds:g} s", console)
         _check_gyros(probed)
         for part in (part for part in parts if part.request == request):
-            values_of_section, line = part.fit(probed, _known(sections, out), wearer)
+            known = parse_settings(_text(sections), str(out))  # with what this calibration has just written
+            values_of_section, line = part.fit(probed, known, wearer)
             console.print(line)
             _check_usual(values_of_section, console)
             for section, values in values_of_section.items():
@@ -167,11 +168,6 @@ def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResul
     if probed.reports.identity is None:
         raise EchostepError(f"{port}: the board does not answer: run echostep doctor")
     return probed
-
-
-def _known(sections: Sections, out: Path) -> Settings:
-    """Settings of the file, with those that this calibration has just written."""
-    return parse_settings(_text(sections), str(out))
 
 
 def _check_gyros(probed: ProbeResult) -> None:

@@ -15,7 +15,7 @@ from echostep.ports.chunks import BOARD, FOOT, MTX
 from echostep_app.board.faults.health import Severity
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board, judge_mtx
 from echostep_app.commissioning.foot_diagnosis import judge_foot_board
-from echostep_app.commissioning.probe import probe
+from echostep_app.commissioning.probe import ProbeResult, probe
 from echostep_app.commissioning.serial_ports import (
     MTX_NAME,
     PortSeen,
@@ -75,8 +75,8 @@ def examine(
     at_ankle = usable.pop(FOOT, None)
     if usable:
         _probe_devices(report, usable, seconds, schedule)
-    if at_ankle is not None:
-        _probe_foot_board(report, at_ankle, seconds)
+    if at_ankle is not None and (probed := _probed(report, "foot board", {BOARD: at_ankle}, seconds)) is not None:
+        judge_foot_board(report, probed, at_ankle)
     report.findings += rules_findings()
     report.findings.sort(key=lambda finding: -finding.severity)
     return report
@@ -112,14 +112,9 @@ def _judge_several_boards(report: Diagnosis, seen: list[PortSeen], *chosen: str 
 
 
 def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, schedule: Schedule | None) -> None:
-    try:
-        probed = probe(ports, seconds, check_gyros=True, schedule=schedule)
-    except EchostepError as error:
-        what, _, remedy = str(error).partition("; ")
-        report.add(Severity.FAULT, "ports", what, remedy or "unplug it and plug it in again")
+    probed = _probed(report, "ports", ports, seconds, check_gyros=True, schedule=schedule)
+    if probed is None:
         return
-    for notice in probed.notices:
-        report.add(Severity.WARNING, "ports", notice, "check the cable and its plugs")
     devices = {name: sender(probed.first_bytes.get(name, b"")) for name in ports}
     if wrong := [(name, device) for name, device in devices.items() if device is not None and device != name]:
         what, _, remedy = wrong_device(*wrong[0], ports).partition(": ")
@@ -131,15 +126,20 @@ def _probe_devices(report: Diagnosis, ports: dict[str, str], seconds: float, sch
         judge_mtx(report, probed, with_board=BOARD in ports)
 
 
-def _probe_foot_board(report: Diagnosis, port: str, seconds: float) -> None:
+def _probed(
+    report: Diagnosis, subject: str, ports: dict[str, str], seconds: float, *,
+    check_gyros: bool = False, schedule: Schedule | None = None,
+) -> ProbeResult | None:  # fmt: skip
+    """What `probe` reads, with its notices as findings; None, with a finding, where a port cannot be opened."""
     try:
-        probed = probe({BOARD: port}, seconds)
+        probed = probe(ports, seconds, check_gyros=check_gyros, schedule=schedule)
     except EchostepError as error:
-        report.add(Severity.FAULT, "foot board", str(error), "unplug it and plug it in again")
-        return
+        what, _, remedy = str(error).partition("; ")
+        report.add(Severity.FAULT, subject, what, remedy or "unplug it and plug it in again")
+        return None
     for notice in probed.notices:
-        report.add(Severity.WARNING, "foot board", notice, "check the cable and its plugs")
-    judge_foot_board(report, probed, port)
+        report.add(Severity.WARNING, subject, notice, "check the cable and its plugs")
+    return probed
 
 
 def print_report(report: Diagnosis, console: Console) -> None:

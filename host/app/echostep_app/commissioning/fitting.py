@@ -7,13 +7,15 @@ In: `ProbeResult`. Out: settings by section and a line for the wearer; EchostepE
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.board.calibration import ADIS16100_RAD_S, GYROS, GyroSettings, ImuSettings
+from echostep.board import calibration
+from echostep.board.calibration import GYROS, GyroSettings, ImuSettings
 from echostep.board.frames import BoardReader, encode
-from echostep.board.messages import GYROS_INVALID
+from echostep.board.messages import ROWS, Compass, Gyros
 from echostep.board.tilt_compass import TiltCompass
 from echostep.errors import EchostepError
 from echostep.legs.heading import CompassErrors, harmonics
@@ -30,9 +32,8 @@ Fit = tuple[dict[str, Values], str]
 
 PIECE_S = 1.0  # a recording is divided into pieces of this length to find those at rest
 LEAST_PIECE_SAMPLES = 20
-STILL_SD_RAD_S = math.radians(
-    2.0
-)  # of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
+# Of a piece at rest; noise of an ADIS16100 is 0.6 degrees/s in 40 Hz, a swaying wearer gives more
+STILL_SD_RAD_S = math.radians(2.0)
 STILL_SPREAD_RAD_S = math.radians(1.0)  # largest distance of a piece's mean from the median of the means
 BIAS_MAX_RAD_S = math.radians(30.0)
 USUAL_BIAS_DEG_S = 5.0  # five standard deviations of parts at room temperature (1 degree/s, as simulated; assumed)
@@ -41,41 +42,29 @@ LEAST_STILL = 0.6  # share of pieces at rest
 FULL_TURN_RAD = math.radians(300.0)  # a turn of 360 degrees, not quite finished
 SWAPPED_RATIO = 1.15  # of the rates' sd, thigh to calf; in walking the shank turns faster than the thigh
 LEAST_READINGS = 100  # of a gyro
-LEAST_BEARINGS = 20
-INVALID_BEARING = 3600  # tenths of a degree; this and larger values are not bearings
+LEAST_HEADINGS = 20
 
 
 def gyro_rates(probed: ProbeResult, settings: GyroSettings | None = None) -> tuple[Floats, Floats]:
-    """Times (n,) s and rates (n, 3) rad/s of thigh, calf and belt without their biases; NaN where a gyro gave none."""
-    biases = settings or GyroSettings()
+    """Times (n,) s and rates (n, 3) rad/s of thigh, calf and belt as it is worn, without their biases; NaN where a gyro gave none."""
     t_s = np.array(probed.ticks.get("Gyros", []), float) / TICKS_PER_S
-    counts = np.array([g[1:] for g in probed.gyros], float).reshape(-1, len(GYROS))
-    counts[counts == GYROS_INVALID] = np.nan
-    return t_s, ADIS16100_RAD_S * counts - np.array(
-        [biases.thigh_bias_rad_s, biases.calf_bias_rad_s, biases.belt_bias_rad_s]
-    )
+    rows = np.array(probed.gyros, ROWS[Gyros(0, 0, 0, 0).id])
+    return t_s, calibration.gyro_rates(rows, replace(settings or GyroSettings(), belt_reversed=False))
 
 
-def bearings(probed: ProbeResult, belt: ImuSettings | None = None) -> tuple[Floats, Floats]:
-    """Times (n,) s and compass bearings (n,) rad, clockwise, of a compass or of a magnetometer; invalid ones left out.
+def headings(probed: ProbeResult, belt: ImuSettings | None = None) -> tuple[Floats, Floats]:
+    """Times (n,) s and headings (n,) rad of a compass, or of a magnetometer, compensated for tilt as during tracking; invalid ones left out.
 
     `belt`: errors of the belt's accelerometer.
     """
-    if not probed.compass and "Magnetic" in probed.ticks:
-        return _bearings_by_field(probed, belt)
-    t_s = np.array(probed.ticks.get("Compass", []), float) / TICKS_PER_S
-    bearing = np.array([c.bearing for c in probed.compass], float)
-    good = bearing < INVALID_BEARING
-    return t_s[good], np.radians(0.1 * bearing[good])
-
-
-def _bearings_by_field(probed: ProbeResult, belt: ImuSettings | None) -> tuple[Floats, Floats]:
-    """The same for a three-axis magnetometer, compensated for tilt as during tracking."""
-    sent = b"".join(encode(message, 0) for message in probed.axes)
-    _, headings = TiltCompass(belt).headings(BoardReader().frames(sent))
-    t_s = np.array(probed.ticks["Magnetic"], float) / TICKS_PER_S
-    good = np.isfinite(headings)
-    return t_s[good], np.mod(0.5 * math.pi - headings[good], 2.0 * math.pi)
+    if by_field := not probed.compass and "Magnetic" in probed.ticks:
+        sent = b"".join(encode(message, 0) for message in probed.axes)
+        _, heading = TiltCompass(belt).headings(BoardReader().frames(sent))
+    else:
+        heading = calibration.compass_headings(np.array(probed.compass, ROWS[Compass(0, 0).id]))
+    t_s = np.array(probed.ticks.get("Magnetic" if by_field else "Compass", []), float) / TICKS_PER_S
+    good = np.isfinite(heading)
+    return t_s[good], heading[good]
 
 
 def still_bias(t_s: Floats, rate: Floats) -> tuple[float, float]:
@@ -135,22 +124,21 @@ def doubt(values: dict[str, Values]) -> str:
 
 
 def _turn(probed: ProbeResult, settings: Settings) -> tuple[Floats, Floats, Floats, Floats]:
-    """Times (n,) s and rates (n,) rad/s of the belt gyro, times (k,) s and bearings (k,) rad of the compass; raises EchostepError."""
+    """Times (n,) s and rates (n,) rad/s of the belt gyro, times (k,) s and headings (k,) rad of the compass; raises EchostepError."""
     t_s, rate = gyro_rates(probed, settings.gyro)
     belt = rate[:, GYROS.index("belt")]
     valid = np.isfinite(belt)
-    bearing_s, bearing = bearings(probed, settings.belt_imu)
-    if valid.sum() < LEAST_READINGS or len(bearing) < LEAST_BEARINGS:
+    read_s, heading = headings(probed, settings.belt_imu)
+    if valid.sum() < LEAST_READINGS or len(heading) < LEAST_HEADINGS:
         raise EchostepError("belt gyro or compass gives no values: run echostep doctor")
-    return t_s[valid], belt[valid], bearing_s, bearing
+    return t_s[valid], belt[valid], read_s, heading
 
 
 def fit_mounting(probed: ProbeResult, settings: Settings) -> Fit:
     """Whether the belt gyro is worn upside down: the sign of its correlation with the compass in a turn on the spot."""
-    t_s, belt, bearing_s, bearing = _turn(probed, settings)
+    t_s, belt, read_s, heading = _turn(probed, settings)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(t_s) * 0.5 * (belt[1:] + belt[:-1]))])
-    by_gyro = np.interp(bearing_s, t_s, turned)
-    by_compass = -np.unwrap(bearing)  # counter-clockwise
+    by_gyro, by_compass = np.interp(read_s, t_s, turned), np.unwrap(heading)
     if np.ptp(by_compass) < FULL_TURN_RAD or np.ptp(by_gyro) < 0.5 * FULL_TURN_RAD:
         seen = f"{math.degrees(np.ptp(by_compass)):.0f} by the compass, {math.degrees(np.ptp(by_gyro)):.0f} by the belt gyro"
         raise EchostepError(
@@ -164,11 +152,11 @@ def fit_mounting(probed: ProbeResult, settings: Settings) -> Fit:
 
 def fit_compass(probed: ProbeResult, settings: Settings) -> Fit:
     """Hard- and soft-iron errors of the compass, from a turn on the spot."""
-    t_s, belt, bearing_s, bearing = _turn(probed, settings)
-    heading = np.full(len(t_s), np.nan)
-    heading[np.clip(np.searchsorted(t_s, bearing_s), 0, len(t_s) - 1)] = 0.5 * math.pi - bearing
+    t_s, belt, read_s, heading = _turn(probed, settings)
+    read = np.full(len(t_s), np.nan)
+    read[np.clip(np.searchsorted(t_s, read_s), 0, len(t_s) - 1)] = heading
     try:
-        iron = fit_compass_errors(t_s, belt, heading)
+        iron = fit_compass_errors(t_s, belt, read)
     except ValueError as error:
         raise EchostepError(f"compass: {error}, and do it again") from error
     names = ("sin1", "cos1", "sin2", "cos2", "rms_rad")

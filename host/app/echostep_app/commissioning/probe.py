@@ -56,6 +56,11 @@ LEAST_BOARD_S = 3.0  # of a board that starts during the probe: all its streams 
 LEAST_RATE_S = 1.0  # for rates
 
 
+_KEPT: dict[type[Message], str] = {  # of which all are kept, in which field of the result
+    Ping: "pings", Gyros: "gyros", Compass: "compass", Pressure: "pressures", Foot: "foot", Motion: "axes", Magnetic: "axes",
+}  # fmt: skip
+
+
 @dataclass(slots=True)
 class ProbeResult:
     """Data received in `seconds`. `ticks`: times of the board's messages by kind, unwrapped, counted from the first message.
@@ -225,18 +230,8 @@ class _Probe:
         result.ticks.setdefault(type(message).__name__, []).append(elapsed)
         if isinstance(message, ClockReply) and message.token in self._query_sent_s:
             result.replies.append((self._query_sent_s[message.token], arrived_s, elapsed))
-        elif isinstance(message, Ping):
-            result.pings.append(message)
-        elif isinstance(message, Gyros):
-            result.gyros.append(message)
-        elif isinstance(message, Compass):
-            result.compass.append(message)
-        elif isinstance(message, Pressure):
-            result.pressures.append(message)
-        elif isinstance(message, Foot):
-            result.foot.append(message)
-        elif isinstance(message, Motion | Magnetic):
-            result.axes.append(message)
+        elif name := _KEPT.get(type(message)):
+            getattr(result, name).append(message)
 
     def _set_up_mtx(self, chunk: Chunk | None) -> None:
         if MTX not in self._names or self.result.mtx_fault:

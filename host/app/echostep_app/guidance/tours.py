@@ -78,8 +78,7 @@ def _first_place(plan: Plan) -> RoutePlace:
 def _places(plan: Plan, level: int) -> list[RoutePlace]:
     """The rooms of a level; the middles of its doors when it names none."""
     rooms = [RoutePlace(*room.at_m, level) for room in plan.levels[level].rooms]
-    doors = [door.line for door in plan.levels[level].doors]
-    return rooms or [RoutePlace(0.5 * (x0 + x1), 0.5 * (y0 + y1), level) for x0, y0, x1, y1 in doors]
+    return rooms or [RoutePlace(*door.middle_m, level) for door in plan.levels[level].doors]
 
 
 def waypoints(plan: Plan, route: Route) -> list[Waypoint]:

@@ -17,9 +17,8 @@ from echostep.path import MeasuredSegment
 from echostep_app.mapping.graph.bias import find_bias, without_bias
 from echostep_app.mapping.graph.directions import right_angles_off
 from echostep_app.mapping.graph.graph import Graph
-from echostep_app.mapping.graph.levels import find_levels
 from echostep_app.mapping.graph.nodes import Nodes, nodes_of
-from echostep_app.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
+from echostep_app.mapping.mapper import Mapped, close_loops, find_walls, new_graph
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings
 from echostep_app.mapping.walls.drawing import draw
 
@@ -45,9 +44,7 @@ class GrowingMap:
         if bias != self._bias_rad_m:
             self._bias_rad_m, self._solved = bias, None
         nodes, pings = without_bias(nodes, pings, bias)
-        fragments, directions = find_pieces(nodes, pings)
-        graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
-        graph.levels = find_levels(self._segments, nodes)
+        (graph, directions), solved, first = new_graph(self._segments, nodes, pings), self._solved, 0
         if solved is not None and _begins_alike(solved.nodes, nodes) and _same(solved.base_rad, graph.base_rad):
             first, graph.base_rad = len(solved.nodes) - 1, solved.base_rad
             graph.pose = _continued(solved.pose, graph.pose)

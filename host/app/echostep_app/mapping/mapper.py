@@ -58,9 +58,7 @@ def map_walk(segments: Sequence[MeasuredSegment], progress: Progress = lambda _s
     segments = with_smoothed_headings(segments)
     nodes, pings = nodes_of(segments)
     nodes, pings = without_bias(nodes, pings, find_bias(nodes, pings))
-    fragments, directions = find_pieces(nodes, pings)
-    graph = new_graph(nodes, fragments, directions)
-    graph.levels = find_levels(segments, nodes)
+    graph, directions = new_graph(segments, nodes, pings)
     for _ in range(LOCAL_ROUNDS):
         find_walls(graph)
     undone = close_loops(graph, progress)
@@ -76,15 +74,16 @@ def find_pieces(nodes: Nodes, pings: Pings) -> tuple[Fragments, Directions]:
     return with_spots(nodes, pings, fragments, directions), directions
 
 
-def new_graph(nodes: Nodes, fragments: Fragments, directions: Directions) -> Graph:
-    """The graph with its path as the building's directions correct it, where it has any."""
+def new_graph(segments: Sequence[MeasuredSegment], nodes: Nodes, pings: Pings) -> tuple[Graph, Directions]:
+    """The graph of a walk with its path as the building's directions correct it, where it has any; and the directions."""
+    fragments, directions = find_pieces(nodes, pings)
     none = FittedWalls(np.zeros(0), np.zeros(0), np.full(len(fragments.node), -1))
-    if directions.evidence < LEAST_EVIDENCE:
-        return Graph(nodes, fragments, nodes.pose.copy(), none)
-    pose, drift = nodes.pose.copy(), directions.drift_rad
-    pose[1:, :2] = pose[0, :2] + np.cumsum(rotated(np.diff(nodes.pose[:, :2], axis=0), drift[:-1]), axis=0)
-    pose[:, 2] += drift
-    return Graph(nodes, fragments, pose, none, base_rad=directions.base_rad)
+    graph = Graph(nodes, fragments, nodes.pose.copy(), none, levels=find_levels(segments, nodes))
+    if directions.evidence >= LEAST_EVIDENCE:
+        pose, drift, graph.base_rad = graph.pose, directions.drift_rad, directions.base_rad
+        pose[1:, :2] = pose[0, :2] + np.cumsum(rotated(np.diff(nodes.pose[:, :2], axis=0), drift[:-1]), axis=0)
+        pose[:, 2] += drift
+    return graph, directions
 
 
 def find_walls(graph: Graph) -> None:

@@ -15,11 +15,13 @@ import shapely
 from echostep.arrays import Floats
 from echostep.plan import Connector, Door, Level
 from echostep_app.mapping.graph.levels import WalkLevels
+from echostep_app.plan.places.faces import CLEAR_M as BESIDE_DOOR_M
 
 HALF_M = 0.6  # of a flight's width, assumed
 DOOR_M = 1.0  # width of the way in
 CLEAR_M = 0.15  # about the well, in which other walls end: nearer ones are taken for its own
-BEFORE_M = 0.25  # of the well, within which no other door leads: its rim runs along it, as the check of plans says
+# Before the well, where no other door leads: its rim runs along it, as the check of plans says
+BEFORE_M = BESIDE_DOOR_M + 0.05
 LEAST_M = 0.1  # a shorter piece is not a wall
 SHARED = 0.3  # of the smaller well's area: two flights in one well
 

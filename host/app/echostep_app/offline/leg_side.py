@@ -61,9 +61,8 @@ def leg_left_m(strides: tuple[Stride, ...], t_s: Floats, heading: Floats) -> flo
 
     `heading` (n,): of the trunk at `t_s` (n,), rad, positive to the left. The odds follow from two normal distributions about +-TWIST_RAD.
     """
-    seen = [
-        s for s in strides if s.length_m > LEAST_STRIDE_M and not s.flags & (Flag.EDGE | Flag.GAP)
-    ]  # the pelvis turns visibly
+    # In these the pelvis turns visibly
+    seen = [s for s in strides if s.length_m > LEAST_STRIDE_M and not s.flags & (Flag.EDGE | Flag.GAP)]
     twists = np.array([_twist(stride, t_s, heading) for stride in seen])
     twists = twists[np.isfinite(twists)]
     if not len(twists):

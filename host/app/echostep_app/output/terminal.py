@@ -186,8 +186,7 @@ def describe(e: Estimate | None, plan: Plan) -> str:
 def health(tracker: Tracker, *, silent: bool) -> str:
     """Counts of rejected, lost and dropped frames, the time source of the foot's samples, and the beacons, as a line of text."""
     streams = tracker.streams
-    board, status = streams.board, streams.status
-    dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
+    board, dropped = streams.board, streams.reports.dropped
     sync = "is silent" if silent else "on SyncOut" if streams.synchronised else "on arrival times"
     foot = f"{streams.foot_name} {sync}"
     gateway = f"   {gateway_words(tracker.gateway)}" if tracker.gateway.counts.words or tracker.gateway.numbers else ""

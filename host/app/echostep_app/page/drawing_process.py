@@ -33,9 +33,8 @@ END_S = 5.0  # for the thread to end
 # little longer than the ones before, fit into none of their holes, and an hour's walk takes 1 GB.
 PAGES = {"MALLOC_MMAP_THRESHOLD_": "262144"}
 CHILD = "from echostep_app.page.drawing_process import main; main()"
-Stretch = tuple[
-    list[MeasuredSegment], Estimate, int
-]  # with the estimate at its end, and how many points the trail has then
+# With the estimate at its end, and how many points the trail has then
+Stretch = tuple[list[MeasuredSegment], Estimate, int]
 
 
 class DrawingProcess:

@@ -43,9 +43,8 @@ class GuardedSocket(ABC):
         self._player: Player | None = None  # of a recorded run
         self._frame_due = True  # the page needs a frame, even of the same moment
         self._seq = 0  # number of the newest frame
-        self._undrawn: dict[
-            int, int | None
-        ] = {}  # number of a sent frame: arrival (ns) of the bytes that are new in it
+        # Number of a sent frame: arrival (ns) of the bytes that are new in it
+        self._undrawn: dict[int, int | None] = {}
 
     @abstractmethod
     async def _greet(self) -> None:

@@ -104,9 +104,8 @@ class LivePage:
         self._drawing: DrawingProcess | None = None  # of a walk without a plan
         if not replay:
             self.mailbox.publish(self._scene)
-        expected_range(
-            math.nan, 0.0, 0.0, tracker.laid_out.walls.index, self._model
-        )  # compiled now, not at the first step
+        # Compiled now, not at the first step
+        expected_range(math.nan, 0.0, 0.0, tracker.laid_out.walls.index, self._model)
 
     @property
     def url(self) -> str:

@@ -104,9 +104,8 @@ class Mailbox:
         self.errand = ""  # who sent the wearer to the destination, in words
         self.marks: tuple[ShownMark, ...] = ()  # of the commanders, and of this run's pages; replaced, never changed
         self._struck: tuple[ShownMark, ...] = ()  # those of the pages: no way
-        self._drawings: tuple[
-            ShownDrawing, ...
-        ] = ()  # in order of `t_s`; a live run has the newest only; replaced, never changed
+        # In order of `t_s`; a live run has the newest only; replaced, never changed
+        self._drawings: tuple[ShownDrawing, ...] = ()
         self.team: tuple[str, ...] = ()  # names of the teammates who can be met; replaced, never changed
         self.on_publish: Callable[[], None] | None = None
         self.exchange = Exchange()

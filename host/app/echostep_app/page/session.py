@@ -34,9 +34,8 @@ class PageSession(GuardedSocket):
     """Serves one page until it disconnects."""
 
     def __init__(self, socket: WebSocket, mailbox: Mailbox, shared: Shared) -> None:
-        self.latency_s: deque[float] = deque(
-            maxlen=512
-        )  # from the arrival of an estimate's bytes to its frame being drawn
+        # From the arrival of an estimate's bytes to its frame being drawn
+        self.latency_s: deque[float] = deque(maxlen=512)
         super().__init__(socket, mailbox.exchange, shared.faults, shared.counts)
         self._mailbox = mailbox
         self._shared = shared

@@ -97,9 +97,8 @@ def _doors(level: Level, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]
     """Doors with an end that is not at a wall, and doors that a wall runs through."""
     for number, door in enumerate(level.doors):
         name = f"door {door.name or number}"
-        (x0, y0, x1, y1), lines = door.line, (door.line,)
-        at = (x0 + x1) / 2, (y0 + y1) / 2
-        off_m = max(_distance(tree, shapely.Point(end)) for end in ((x0, y0), (x1, y1)))
+        at, lines = door.middle_m, (door.line,)
+        off_m = max(_distance(tree, shapely.Point(end)) for end in (door.line[:2], door.line[2:]))
         if off_m > JAMB_M:
             words = "ends in no wall" if np.isinf(off_m) else f"ends {off_m:.2f} m from any wall"
             yield PlanFinding("door", i, at, f"{name} {words}", lines)

@@ -15,22 +15,12 @@ from echostep.arrays import Floats
 Bounds = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
 
 
-def within(segments: Floats, bounds: Bounds, least_m: float = 0.0) -> Floats:
-    """Segments whose bounding box touches the rectangle; segments shorter than `least_m` in x and in y (less than a pixel) are left out.
-
-    Takes 10 ms for a million segments.
-    """
+def within(segments: Floats, bounds: Bounds) -> Floats:
+    """Segments whose bounding box touches the rectangle; takes 10 ms for a million segments."""
     x0, y0, x1, y1 = bounds
     ax, ay, bx, by = segments.T
-    seen = (
-        (np.maximum(ax, bx) >= x0)
-        & (np.minimum(ax, bx) <= x1)
-        & (np.maximum(ay, by) >= y0)
-        & (np.minimum(ay, by) <= y1)
-    )
-    if least_m > 0.0:
-        seen &= (np.abs(bx - ax) >= least_m) | (np.abs(by - ay) >= least_m)
-    return segments[seen]
+    across = (np.maximum(ax, bx) >= x0) & (np.minimum(ax, bx) <= x1)
+    return segments[across & (np.maximum(ay, by) >= y0) & (np.minimum(ay, by) <= y1)]
 
 
 def is_clear(segments: Floats, a: Sequence[float] | Floats, b: Sequence[float] | Floats) -> bool:

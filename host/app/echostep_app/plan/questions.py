@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import shapely
 
@@ -56,15 +57,8 @@ def _once(questions: list[Question]) -> tuple[Question, ...]:
 
 def _together(group: list[Question]) -> list[Question]:
     """One question for all alike: the answer counts for each. A room's is a short line which begins at its place."""
-    return [
-        replace(
-            group[0],
-            text=f"{len(group)} alike: {group[0].text}",
-            lines_m=tuple(
-                line for one in group for line in one.lines_m or [(*one.at_m, one.at_m[0] + MARK_M, one.at_m[1])]
-            ),
-        )
-    ]
+    lines = (one.lines_m or [(*one.at_m, one.at_m[0] + MARK_M, one.at_m[1])] for one in group)
+    return [replace(group[0], text=f"{len(group)} alike: {group[0].text}", lines_m=tuple(chain.from_iterable(lines)))]
 
 
 def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
@@ -72,9 +66,8 @@ def _of_finding(finding: PlanFinding, level: Level) -> Iterator[Question]:
     at, lines = finding.position_m, finding.lines_m
     if finding.kind == "gap":
         wall = next(line for line in lines if at not in (line[:2], line[2:]))
-        to = shapely.get_coordinates(
-            shapely.shortest_line(shapely.Point(at), shapely.LineString((wall[:2], wall[2:])))
-        )[1]
+        across = shapely.shortest_line(shapely.Point(at), shapely.LineString((wall[:2], wall[2:])))
+        to = shapely.get_coordinates(across)[1]
         piece = (*at, round(float(to[0]), 4), round(float(to[1]), 4))
         yield Question(f"{finding.text}: close the gap?", "wall", at, (piece,), is_proposed=True)
     elif finding.kind == "door":
@@ -90,9 +83,8 @@ def _of_widths(level: Level) -> Iterator[Question]:
     """Doors that are narrower or wider than usual."""
     for door in level.doors:
         if not DOORS_M[0] <= door.width_m <= DOORS_M[1]:
-            x0, y0, x1, y1 = door.line
             text = f"door {door.width_m:.2f} m wide: is it a door?"
-            yield Question(text, "door", ((x0 + x1) / 2, (y0 + y1) / 2), (door.line,))
+            yield Question(text, "door", door.middle_m, (door.line,))
 
 
 def _of_gaps(plan: Plan, level_index: int) -> Iterator[Question]:

@@ -189,11 +189,8 @@ class SerialPorts:
         """Close a lost port and try to open it until that succeeds or `close` is called; returns its URL, which may be another one."""
         if self._stop.is_set():
             return url
-        why = (
-            ""
-            if isinstance(error, serial.SerialException | TypeError)
-            else f" ({getattr(error, 'strerror', '') or error})"
-        )
+        is_usual = isinstance(error, serial.SerialException | TypeError)
+        why = "" if is_usual else f" ({getattr(error, 'strerror', '') or error})"
         self.notices.append(f"{name}: {url} went away{why}: it is opened again as soon as it is back")
         _close(self._ports[name])
         self.lost.add(name)

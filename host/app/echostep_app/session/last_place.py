@@ -22,7 +22,7 @@ from echostep.localization import Estimate, Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import LastPlace
+from echostep.tracker.state import LastPlace
 from echostep.walk.recorded import bounded, possible
 from echostep_app.session.metadata import LAST
 
@@ -102,19 +102,12 @@ def start_last(last: Kept, plan: Plan, board: str, climbing: ClimbSettings, now:
     start = start_after(
         place if is_same else LastPlace(place.x_m, place.y_m, place.sd_m, place.level), away_s, climbing
     )
-    ago = (
-        f"{away_s:.0f} s ago"
-        if away_s >= 0.0
-        else "the time since is not known, for this computer's clock was set back"
-    )
+    unknown = "the time since is not known, for this computer's clock was set back"
+    ago = f"{away_s:.0f} s ago" if away_s >= 0.0 else unknown
     words = f"Start: where the last run ended, {ago}: {place.x_m:.1f}, {place.y_m:.1f}"
     if len(plan.levels) > 1:
-        remark = (
-            "the pressure tells the storey"
-            if start.air
-            else "the pressure does not tell the storey (not the same board)"
-        )
-        words += f" on {plan.levels[place.level].name}; {remark}"
+        tells = "tells the storey" if start.air else "does not tell the storey (not the same board)"
+        words += f" on {plan.levels[place.level].name}; the pressure {tells}"
     return start, f"{words}. The building is searched too: after a walk meanwhile the echoes find the place."
 
 

@@ -197,9 +197,8 @@ class StreamTransport:
         plain = socket.create_connection((self._endpoint.host, self._endpoint.port), SOCKET_TIMEOUT_S)
         try:
             plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            plain.setsockopt(
-                socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384
-            )  # bytes; small, because events in the buffer get outdated
+            # Bytes; small, because events in the buffer get outdated
+            plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384)
             self._socket = self._tls.wrap_socket(plain, server_hostname=self._endpoint.host) if self._tls else plain
         except OSError as error:
             plain.close()

@@ -141,10 +141,8 @@ class Publishing:
         """Before the first estimate, report the streams every HEARTBEAT_S."""
         if now_s - self._offered_s >= HEARTBEAT_S:
             self._offered_s = now_s
-            alarm = self._last.alarm
-            self._offer(
-                replace(self._empty, alarm=alarm, streams=self._history_before_estimate.streams(self._tracker, now_s))
-            )
+            streams = self._history_before_estimate.streams(self._tracker, now_s)
+            self._offer(replace(self._empty, alarm=self._last.alarm, streams=streams))
 
     def end(self) -> None:
         """The run is over: the last reports go out, and receivers are told; returns at once. What does not go out is tried on."""
@@ -195,7 +193,7 @@ class ReportHistory:
     def streams(self, tracker: Tracker, t_s: float) -> StreamReport:
         """Health of the input streams; rates over AVERAGING_S of the clock of `t_s`."""
         state = tracker.streams
-        board, mtx, status = state.board, state.mtx, state.status
+        board, mtx = state.board, state.mtx
         counts = (t_s, mtx.good, board.good)
         self._counts.append(counts)
         while len(self._counts) > 2 and self._counts[1][0] < t_s - AVERAGING_S:
@@ -207,7 +205,7 @@ class ReportHistory:
             board_hz=min(board_hz, 1e6),
             bad=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
             lost=board.lost + mtx.lost,
-            dropped=0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_")),
+            dropped=state.reports.dropped,
             synchronised=state.synchronised,
             findings=tuple(
                 printable(f"{f.subject} {f.what}", 100) for f in all_findings(state.reports, state.foot_reports)[:4]
@@ -221,9 +219,8 @@ def reported_alarm(watch: WearerWatch, now_s: float) -> ReportedAlarm | None:
     if alarm is None:
         return None
     age_s = now_s - alarm.since_s
-    return ReportedAlarm(
-        alarm.kind.value, alarm.reason.value, alarm.number, min(age_s, 1e9) if age_s > 0.0 else 0.0
-    )  # NaN before the first samples
+    age_s = min(age_s, 1e9) if age_s > 0.0 else 0.0  # NaN before the first samples
+    return ReportedAlarm(alarm.kind.value, alarm.reason.value, alarm.number, age_s)
 
 
 def empty_report(plan: Plan, name: str, team: str, run: str, source: Source) -> Report:

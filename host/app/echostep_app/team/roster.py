@@ -166,13 +166,9 @@ class Roster:
         self._remove_old(now_s)
 
         def urgency(m: Member) -> tuple[int, float, float, tuple[str, str, str]]:
-            p, state = m.at(now_s).position, m.state(now_s)
-            silence = (
-                m.silent_s(now_s)
-                if state in (MemberState.MAYDAY, MemberState.ASKED, MemberState.LOST, MemberState.STALE)
-                and m.silent_s(now_s) > m.stale_after_s
-                else 0.0
-            )
+            p, state, silent_s = m.at(now_s).position, m.state(now_s), m.silent_s(now_s)
+            counts = state in (MemberState.MAYDAY, MemberState.ASKED, MemberState.LOST, MemberState.STALE)
+            silence = silent_s if counts and silent_s > m.stale_after_s else 0.0
             return _URGENCY[state], -silence, -(p.radius95_m if p else 0.0), m.key
 
         return sorted(self._members.values(), key=urgency)

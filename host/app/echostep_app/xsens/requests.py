@@ -77,16 +77,9 @@ def set_rate(rate_hz: float) -> tuple[Request, ...]:
     for skip in range(10):
         period = CLOCK_HZ / (rate_hz * (skip + 1))
         if period.is_integer() and SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
-            return (
-                Request(
-                    "SetPeriod",
-                    0x04,
-                    struct.pack(">H", int(period)),
-                    instead=successor_requests(rate_hz),
-                    remark="it sends MTData2",
-                ),
-                Request("SetOutputSkipFactor", 0xD4, struct.pack(">H", skip)),
-            )
+            by_period, instead = struct.pack(">H", int(period)), successor_requests(rate_hz)
+            first = Request("SetPeriod", 0x04, by_period, instead=instead, remark="it sends MTData2")
+            return first, Request("SetOutputSkipFactor", 0xD4, struct.pack(">H", skip))
     raise ValueError(f"[mtx] rate_hz: an MTx cannot sample at {rate_hz:g} Hz; take 50, 60, 100, 120 or 128")
 
 
@@ -128,13 +121,9 @@ def successor_requests(rate_hz: float) -> tuple[Request, ...]:
     The answer lists the rates that the device really has. A device without orientation (MTi-1, MTi-610) may refuse it, and is asked for less.
     """
     least = _output_configuration(NEEDED, round(rate_hz))
-    return (
-        replace(
-            _output_configuration(WITH_ORIENTATION, round(rate_hz)),
-            instead=(least,),
-            remark="it sends neither orientation nor magnetic field",
-        ),
-    )
+    whole = _output_configuration(WITH_ORIENTATION, round(rate_hz))
+    remark = "it sends neither orientation nor magnetic field"
+    return (replace(whole, instead=(least,), remark=remark),)
 
 
 def _output_configuration(outputs: tuple[int, ...], rate: int) -> Request:

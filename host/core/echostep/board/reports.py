@@ -51,6 +51,12 @@ class BoardReports:
             self.previous_status, self.status = None if restarted else self.status, message
 
     @property
+    def dropped(self) -> int:
+        """Samples and messages that the board has dropped, by its newest status."""
+        counts = {} if self.status is None else self.status._asdict()
+        return sum(count for name, count in counts.items() if name.startswith("dropped_"))
+
+    @property
     def sensors(self) -> messages.Sensors:
         """The sensors that are switched on; all of them before the first `Configuration`, none on a foot board."""
         if self.foot is not None:

@@ -44,12 +44,9 @@ class TiltCompass:
         """`belt`: errors of the belt's accelerometer; None if it was not calibrated."""
         errors = belt or ImuSettings()
         self._offset, self._scale = errors.offset / LSM6DSO_M_S2, errors.scale  # counts, 1
-        self._sums: deque[NDArray[np.int64]] = deque(
-            maxlen=INTERVALS
-        )  # of each interval: the forces' counts, and their number
-        self._sum = np.zeros(
-            4, np.int64
-        )  # of the interval under way; integers: the sum does not depend on the portions
+        # Of each interval, and of the one under way: the forces' counts, and their number; integers do not depend on the portions
+        self._sums: deque[NDArray[np.int64]] = deque(maxlen=INTERVALS)
+        self._sum = np.zeros(4, np.int64)
 
     def headings(self, frames: Frames) -> tuple[Ints, Floats]:
         """Row of the frame (n,) and heading (n,) of each `Magnetic` message; NaN for a field that was not measured or is saturated."""

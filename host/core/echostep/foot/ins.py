@@ -317,8 +317,7 @@ def _correct(nav: Nav, component: int, error: float, variance: float, considered
         nav.position[i] += share * row[POS + i]
         nav.velocity[i] += share * row[VEL + i]
         nav.accel_bias[i] += share * row[ACCEL_BIAS + i]
-    turned = turning(share * row[TILT], share * row[TILT + 1], share * row[TILT + 2])
-    _set_attitude(nav, multiply(turned, nav.attitude))
+    turn_by(nav, (share * row[TILT], share * row[TILT + 1], share * row[TILT + 2]))
     for k in range(1, SIZE + 1):
         i = (component + k) % SIZE  # the row itself last: the others need it as it was
         gain = row[i] / total
@@ -336,7 +335,7 @@ def turn(nav: Nav, centre: Floats, angle: float) -> None:
     u, v = nav.velocity[0], nav.velocity[1]
     nav.position[0], nav.position[1] = centre[0] + c * x - s * y, centre[1] + s * x + c * y
     nav.velocity[0], nav.velocity[1] = c * u - s * v, s * u + c * v
-    _set_attitude(nav, multiply(turning(0.0, 0.0, angle), nav.attitude))
+    turn_by(nav, (0.0, 0.0, angle))
 
 
 @lean_part

@@ -195,12 +195,6 @@ def rest_variance(nav: Nav, rate2: float) -> float:
 
 
 @lean_part
-def deceleration_variance(force2: float) -> float:
-    """Additional variance (m/s)2 of a foot that may still decelerate: its acceleration over half the window."""
-    return (0.5 * WINDOW_S) ** 2 * force2
-
-
-@lean_part
 def zero_velocity_update(nav: Nav, expected: Vector, variance: float, dt: float) -> None:
     """Zero-velocity update; its variance is scaled so that the information per second does not depend on the sample rate.
 

@@ -125,10 +125,13 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class FootEvents:
-    """Events of samples (n,): `sample_index` (k,) of the sample after which each event was known; `heading_rad`, `stance` (n,) after each sample."""
+    """Events of samples (n,): `sample_index` (k,) of the sample after which each event was known; `position_m` (n, 3), `heading_rad`, `stance` (n,)
+    after each sample.
+    """
 
     events: list[Step | Stance]
     sample_index: Ints
+    position_m: Floats
     heading_rad: Floats
     stance: Bools
 
@@ -182,7 +185,9 @@ class Foot:
         rows = np.zeros((len(t_s), zupt_state.ROW_SIZE))
         events = self._run(t_s, accel, gyro, mag, rows)
         known = np.searchsorted(rows[:, zupt_state.ROW_EVENT_COUNT], np.arange(1, len(events) + 1))
-        return FootEvents(events, known, rows[:, zupt_state.ROW_HEADING], rows[:, zupt_state.ROW_IN_STANCE] > 0.0)
+        position_m = rows[:, zupt_state.ROW_POSITION : zupt_state.ROW_POSITION + 3]
+        heading_rad, stands = rows[:, zupt_state.ROW_HEADING], rows[:, zupt_state.ROW_IN_STANCE] > 0.0
+        return FootEvents(events, known, position_m, heading_rad, stands)
 
     def _run(self, t_s: Floats, accel: Floats, gyro: Floats, mag: Floats | None, rows: Floats) -> list[Step | Stance]:
         """Events of the samples; fills `rows` (n, ROW_SIZE), or nothing if it is empty."""
@@ -194,8 +199,9 @@ class Foot:
             )
         events = np.zeros((zupt_state.EVENTS_PER_SAMPLE * len(t_s), zupt_state.EVENT_SIZE))
         state = zupt_state.ZuptInsState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
-        count = zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), zupt_state.Output(events, rows))
-        return [_event(row) for row in events[:count]]
+        output = zupt_state.Output(events, rows, np.zeros(1, np.int64))
+        zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), output)
+        return [_event(row) for row in events[: output.written[0]]]
 
 
 def walk_track(
@@ -208,16 +214,10 @@ def walk_track(
 ) -> Track:
     """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live."""
     foot = Foot(settings, noise)
-    rows = np.zeros((len(t_s), zupt_state.ROW_SIZE))
-    events = foot._run(t_s, accel, gyro, mag, rows)
+    found = foot.track(t_s, accel, gyro, mag)
+    t_s = np.asarray(t_s, np.float64)
     return Track(
-        np.asarray(t_s, np.float64),
-        rows[:, zupt_state.ROW_POSITION : zupt_state.ROW_POSITION + 3],
-        rows[:, zupt_state.ROW_HEADING],
-        rows[:, zupt_state.ROW_IN_STANCE] > 0.0,
-        events,
-        foot.counts,
-        compass=foot.compass,
+        t_s, found.position_m, found.heading_rad, found.stance, found.events, foot.counts, compass=foot.compass
     )
 
 

@@ -16,8 +16,7 @@ from echostep.foot import ins, mounting, soft_limit, stance, unrest
 from echostep.foot import magnetometer as magnetic
 from echostep.foot import zupt_state as out
 from echostep.foot.ins import POS, TILT, VEL, YAW, Nav
-from echostep.foot.magnetometer import Magnetometer
-from echostep.foot.stance import SampleWindow, ZaruSums
+from echostep.foot.stance import SampleWindow
 from echostep.foot.zupt_state import ImuSample, Output, Samples, ZuptInsState, ZuptState
 from echostep.jit import lean_kernel, lean_part
 
@@ -29,8 +28,8 @@ GAP_S = 0.25  # shorter gaps are propagated over
 # The same for a moving foot: its speed changes by metres per second in a tenth of a second; assumed
 MOVING_GAP_S = 0.08
 STRAY_SAMPLES = 20  # this many samples in a row with earlier times: the clock was set back
-# Of a wearer while samples are missing: sd of his speed along each axis, 1/e time of what he did before; of his foot beside him. Assumed
-WALK_M_S, GOES_ON_S, BESIDE_M = 1.0, 4.0, 0.3
+# Of a wearer while samples are missing, assumed: 1/e time of his pace before; 1 sd of what he does beside that, and of his foot beside him
+GOES_ON_S, WALK_M_S, BESIDE_M = 4.0, 0.6, 0.4
 START_M_S = 1.5  # of a foot that is levelled though it may move, 1 sd
 MOST_M_S = 20.0  # of a sprinter's foot in its swing
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
@@ -46,28 +45,26 @@ RISER_M = 0.15  # a greater rise may be a stair: least riser of ISO 21542
 
 
 @lean_kernel
-def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
-    """Navigate through the samples in turn and fill `output`; returns the number of events."""
-    s, nav, window, sums, compass = foot
+def process(foot: ZuptInsState, samples: Samples, output: Output) -> None:
+    """Navigate through the samples in turn and fill `output`."""
+    s, nav, rows = foot.zupt, foot.nav, output.rows
     t_s, accel, gyro, mag = samples
-    events, rows = output
-    event_count = 0
     for k in range(len(t_s)):
         if _usable(s, t_s[k], accel[k], gyro[k]):
             dt = t_s[k] - s.t_s if s.samples > 1 else 0.0
             bridged_s = MOVING_GAP_S if s.levelled and s.rest_s == 0.0 else GAP_S
             if s.samples > 1 and not 0.0 < dt <= bridged_s:
-                event_count = _restart(s, nav, sums, compass, dt, events, event_count)
+                _restart(foot, dt, output)
                 dt = 0.0
             sample = ImuSample(dt, t_s[k], accel[k], gyro[k])
             _track_period(s, dt)
-            stance.add_sample(window, t_s[k], accel[k], gyro[k])
+            stance.add_sample(foot.window, t_s[k], accel[k], gyro[k])
             if s.levelled:
-                event_count = _navigate(s, nav, window, sums, compass, sample, events, event_count)
+                _navigate(foot, sample, output)
                 if len(mag) and s.rest_s > 0.0:
-                    magnetic.accumulate(compass, nav, mag[k])
+                    magnetic.accumulate(foot.compass, nav, mag[k])
             else:
-                event_count = _find_level(s, nav, window, sample, events, event_count)
+                _find_level(foot, sample, output)
             s.t_s = t_s[k]
             for i in range(3):
                 s.force[i], s.rate[i] = accel[k, i], gyro[k, i]
@@ -76,8 +73,7 @@ def process(foot: ZuptInsState, samples: Samples, output: Output) -> int:
                 rows[k, out.ROW_POSITION + i] = nav.position[i]
             rows[k, out.ROW_HEADING] = ins.heading(nav)
             rows[k, out.ROW_IN_STANCE] = s.in_stance * (1 - s.pushed)
-            rows[k, out.ROW_EVENT_COUNT] = event_count
-    return event_count
+            rows[k, out.ROW_EVENT_COUNT] = output.written[0]
 
 
 @lean_part
@@ -109,34 +105,30 @@ def _track_period(s: ZuptState, dt: float) -> None:
 
 
 @lean_part
-def _restart(
-    s: ZuptState, nav: Nav, sums: ZaruSums, compass: Magnetometer, dt: float, events: Floats, event_count: int
-) -> int:
+def _restart(foot: ZuptInsState, dt: float, output: Output) -> None:
     """Stop navigation until the next levelling: samples are missing, or clock or level are wrong. Ends the stance, inflates the yaw variance."""
+    s, nav = foot.zupt, foot.nav
     s.gaps += 1
     span_s = min(max(dt, GAP_S), 3600.0)
     s.lost_s += span_s
     if s.in_stance:
-        event_count = _end_stance(s, nav, compass, events, event_count)
+        _end_stance(foot, output)
     nav.P[YAW, YAW] = min(nav.P[YAW, YAW] + UNSURE_YAW_RAD2_S * span_s, stance.UNKNOWN_YAW_RAD2)
     if s.levelled:
         s.yaw_rad = ins.heading(nav)
-    stance.clear_rest(sums)
+    stance.clear_rest(foot.sums)
     s.levelled = 0
     s.still_s = s.lasting_s = s.waited_s = s.rest_s = s.flight_s = 0.0
-    return event_count
 
 
 @lean_part
-def _find_level(
-    s: ZuptState, nav: Nav, window: SampleWindow, sample: ImuSample, events: Floats, event_count: int
-) -> int:
+def _find_level(foot: ZuptInsState, sample: ImuSample, output: Output) -> None:
     """Level the foot after LEVEL_S of stillness, from the mean force; after IMPATIENT_S at any possible stance, with a larger tilt sd."""
-    dt, t_s = sample.dt, sample.t_s
-    stillness = stance.stillness_statistic(*stance.activity(window, nav.gyro_bias))
+    s, nav, dt, t_s = foot.zupt, foot.nav, sample.dt, sample.t_s
+    stillness = stance.stillness_statistic(*stance.activity(foot.window, nav.gyro_bias))
     s.waited_s += dt
     s.still_s = s.still_s + dt if stillness < stance.STILL else 0.0
-    force = stance.mean_force(window)
+    force = stance.mean_force(foot.window)
     if s.still_s == 0.0:
         s.force_count = 0
     for i in range(3):
@@ -146,44 +138,33 @@ def _find_level(
         n, total = s.force_count, s.force_sum
         ins.set_level(nav, (total[0] / n, total[1] / n, total[2] / n), s.yaw_rad, True)
         _start_navigation(s, nav, t_s, STILL_TILT_RAD, 0.02)
-        event_count = _begin_stance(s, nav, t_s - s.still_s, events, event_count)
+        _begin_stance(s, nav, t_s - s.still_s, output)
     elif s.waited_s >= IMPATIENT_S and stillness < 1.0:
         ins.set_level(nav, force, s.yaw_rad, False)
         _start_navigation(s, nav, t_s, UNSURE_TILT_RAD, START_M_S)
-        event_count = _begin_stance(s, nav, t_s, events, event_count)
-    return event_count
+        _begin_stance(s, nav, t_s, output)
 
 
 @lean_part
 def _start_navigation(s: ZuptState, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
-    """Start navigation at this sample. In the unobserved time the wearer went on as before, less and less surely: a Gauss-Markov process."""
+    """Start navigation at this sample. In the unobserved time the wearer went on at his pace, and slowed down."""
     ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, nav.noise.gyro_bias, nav.noise.accel_bias)
     if s.lost_s > 0.0:
         lost_s = s.lost_s + s.waited_s
         pace_s = max(s.stride_s, t_s - lost_s - s.stance_begin_s)
-        ago = lost_s / GOES_ON_S
-        kept = math.exp(-ago)
-        variance = (WALK_M_S * GOES_ON_S) ** 2 * (2.0 * ago - 3.0 + 4.0 * kept - kept * kept) + BESIDE_M**2
+        for_s = GOES_ON_S * (1.0 - math.exp(-lost_s / GOES_ON_S))
         for i in range(3):
-            nav.position[i] += s.stride_m[i] / pace_s * GOES_ON_S * (1.0 - kept) if s.stride_s > 0.0 else 0.0
-            nav.P[POS + i, POS + i] = variance
+            nav.position[i] += for_s * s.stride_m[i] / pace_s if s.stride_s > 0.0 else 0.0
+            nav.P[POS + i, POS + i] = BESIDE_M**2 + (WALK_M_S * lost_s) ** 2
     s.lost_s = 0.0
     s.levelled = 1
     s.rest_end_s = t_s
 
 
 @lean_part
-def _navigate(
-    s: ZuptState,
-    nav: Nav,
-    window: SampleWindow,
-    sums: ZaruSums,
-    compass: Magnetometer,
-    sample: ImuSample,
-    events: Floats,
-    event_count: int,
-) -> int:
+def _navigate(foot: ZuptInsState, sample: ImuSample, output: Output) -> None:
     """One sample of navigation: propagate, detect stance, update, write events."""
+    s, nav, window, sums, _ = foot
     dt, t_s, accel, gyro = sample
     ins.propagate(nav, dt, s.period_s, s.force, accel, s.rate, gyro)
     # A push that was taken for a tilt, wrong samples: nothing that was learnt is right
@@ -191,7 +172,8 @@ def _navigate(
         for i in range(3):
             nav.gyro_bias[i] = 0.0
             nav.accel_bias[i] = 0.0
-        return _restart(s, nav, sums, compass, dt, events, event_count)
+        _restart(foot, dt, output)
+        return
     _inflate_at_limits(s, nav, dt, accel, gyro)
     s.saturated += soft_limit.restore(nav, window, s.period_s, s.rate_peak, s.rate_plateau)
     if not s.in_stance:
@@ -205,8 +187,8 @@ def _navigate(
         if not s.in_stance:
             mounting.accumulate(s.tilt_square, s.tilt_cube, ins.difference(mounting.tilt(nav), s.stance_tilt), dt)
         if s.in_stance and t_s - s.rest_end_s >= LEAVE_S - 1e-6:
-            event_count = _end_stance(s, nav, compass, events, event_count)
-        return event_count
+            _end_stance(foot, output)
+        return
     s.rest_s += dt
     s.rest_end_s = t_s
     s.rest_yaw_rad = ins.heading(nav)
@@ -218,8 +200,7 @@ def _navigate(
             ins.update(nav, POS + 2, -rise_m, nav.noise.flat_m**2)
         elif abs(rise_m) < min(FLAT_SDS * math.sqrt(nav.P[POS + 2, POS + 2]), RISER_M):
             ins.reset_height(nav, s.origin[2])
-        event_count = _begin_stance(s, nav, t_s - s.rest_s, events, event_count)
-    return event_count
+        _begin_stance(s, nav, t_s - s.rest_s, output)
 
 
 @lean_part
@@ -252,7 +233,9 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
         unrest.accumulate(s, nav, sample.gyro, level, dt)
-    stance.zero_velocity_update(nav, expected, variance + stance.deceleration_variance(force2), dt)
+    # The foot may still decelerate: by its acceleration over half the window
+    braking = (0.5 * stance.WINDOW_S) ** 2 * force2
+    stance.zero_velocity_update(nav, expected, variance + braking, dt)
     return True
 
 
@@ -296,7 +279,7 @@ def _limit_variance(value: float, span_s: float, dt: float) -> float:
 
 
 @lean_part
-def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_count: int) -> int:
+def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, output: Output) -> None:
     """Begin a stance; write the step that led to it if there was a stance before."""
     s.in_stance = 1
     s.settled = 0
@@ -307,12 +290,11 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, events: Floats, event_
     s.rest_yaw_rad = ins.heading(nav)
     s.stance_tilt[0], s.stance_tilt[1], s.stance_tilt[2] = mounting.tilt(nav)
     if s.walking:
-        _write_step(s, nav, events[event_count])
-        event_count += 1
+        _write_step(s, nav, output.events[output.written[0]])
+        output.written[0] += 1
     s.walking = 1
     s.origin[0], s.origin[1], s.origin[2] = nav.position[0], nav.position[1], nav.position[2]
     s.yaw_variance = nav.P[YAW, YAW]
-    return event_count
 
 
 @lean_part
@@ -342,9 +324,10 @@ def _settle(s: ZuptState, nav: Nav) -> None:
 
 
 @lean_part
-def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, event_count: int) -> int:
+def _end_stance(foot: ZuptInsState, output: Output) -> None:
     """Write the stance, which ended with its last rest, and apply the magnetometer's yaw correction."""
-    row = events[event_count]
+    s, nav, row = foot.zupt, foot.nav, output.events[output.written[0]]
+    output.written[0] += 1
     row[out.KIND], row[out.START_S], row[out.END_S] = out.STANCE, s.stance_begin_s, max(s.rest_end_s, s.stance_begin_s)
     row[out.HEADING] = s.rest_yaw_rad
     s.stance_end_s = row[out.END_S]
@@ -354,9 +337,8 @@ def _end_stance(s: ZuptState, nav: Nav, compass: Magnetometer, events: Floats, e
     if not s.settled:
         _settle(s, nav)
     yaw = ins.heading(nav)
-    turn = magnetic.correction(compass, nav, s.rest_yaw_rad)
+    turn = magnetic.correction(foot.compass, nav, s.rest_yaw_rad)
     if turn != 0.0:
         ins.turn(nav, s.origin, turn - (ins.heading(nav) - yaw))
         s.rest_yaw_rad += turn
         s.yaw_variance = min(s.yaw_variance, nav.P[YAW, YAW])
-    return event_count + 1

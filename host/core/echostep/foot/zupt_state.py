@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from echostep.arrays import Floats, record_dtype
+from echostep.arrays import Floats, Ints, record_dtype
 from echostep.foot.ins import Nav
 from echostep.foot.magnetometer import Magnetometer
 from echostep.foot.stance import SampleWindow, ZaruSums
@@ -107,10 +107,11 @@ class ImuSample(NamedTuple):
 
 
 class Output(NamedTuple):
-    """`events` (2n, EVENT_SIZE); `rows` (n, ROW_SIZE) of the foot after each sample, or (0, ROW_SIZE) where not wanted."""
+    """`events` (2n, EVENT_SIZE), the first `written` (1,) are filled; `rows` (n, ROW_SIZE) after each sample, or (0, ROW_SIZE) where not wanted."""
 
     events: Floats
     rows: Floats
+    written: Ints
 
 
 ZUPT_STATE = record_dtype(ZuptState, array_size=3)

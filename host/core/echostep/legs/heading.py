@@ -85,16 +85,8 @@ class Heading:
         self.settings = s = settings or HeadingSettings()
         self.state = np.zeros(SIZE)
         iron_sd = CALIBRATED_SHARE * s.iron_sd_rad if s.iron else s.iron_sd_rad
-        self.P = np.diag(
-            [
-                sd_rad**2,
-                s.bias_sd_rad_s**2,
-                iron_sd**2,
-                iron_sd**2,
-                (SECOND_SHARE * iron_sd) ** 2,
-                (SECOND_SHARE * iron_sd) ** 2,
-            ]
-        )
+        second_sd = SECOND_SHARE * iron_sd
+        self.P = np.diag(np.square([sd_rad, s.bias_sd_rad_s, iron_sd, iron_sd, second_sd, second_sd]))
         if s.iron:
             self.state[IRON:] = s.iron.sin1, s.iron.cos1, s.iron.sin2, s.iron.cos2
         self.known = self._given = heading_rad is not None

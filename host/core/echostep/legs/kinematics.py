@@ -114,11 +114,6 @@ class Travel:
         return 2.0 * PELVIS * float(halves[0]), 2.0 * float(halves[1])
 
 
-def knee_at(phase: Floats, thigh: Floats, shank: Floats, wanted_phase: float) -> float:
-    """Flexion (rad) of the knee at one phase, from angles (n,) at phases (n,)."""
-    return float(np.interp(wanted_phase, phase, thigh - shank))
-
-
 def travel(
     phase: Floats,
     thigh: Floats,

@@ -18,7 +18,6 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.legs.angle_grid import AngleGrid
 from echostep.legs.gyro_bias import GyroBias
-from echostep.legs.kinematics import knee_at
 from echostep.legs.swing_detection import GRID_HZ, heel_strike_index
 from echostep.legs.walking_bout import climbs
 
@@ -167,4 +166,5 @@ class LegAngles:
 
 def knees(phase: Floats, thigh: Floats, shank: Floats) -> tuple[float, float]:
     """Flexion of the knee (rad) at the strike and half a stride later, from angles (n,) at phases (n,)."""
-    return knee_at(phase, thigh, shank, wanted_phase=0.02), knee_at(phase, thigh, shank, wanted_phase=0.5)
+    strike, later = np.interp((0.02, 0.5), phase, thigh - shank).tolist()
+    return strike, later

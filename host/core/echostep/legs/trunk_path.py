@@ -33,9 +33,8 @@ FRAME_SD_RAD = math.radians(1.0)
 SLOW_RAD_S = math.radians(10.0)  # largest rate of a standing leg, with the gyro's bias
 SETTING_OFF_S = 1.0  # duration of the motion in an edge of a walk
 SCALE_SD = 0.004  # random walk of the strides' scale per stride
-TURNED_SD = (
-    0.5  # sd over the length and turn (rad) of an edge: who turns on the spot before it has taken a stride or none
-)
+# Sd over the length and turn (rad) of an edge: who turns on the spot before it has taken a stride or none
+TURNED_SD = 0.5
 CURVE_SD = 0.5  # sd over the shortening of a stride in a curve: the trunk does not turn evenly
 TWIST_RAD = math.radians(12.0)  # range of the pelvis' rotation in a straight stride, which does not shorten it
 REMEMBERED_S = 12.0  # of headings: longer than any delay of a stride
@@ -122,14 +121,13 @@ class LegPath:
         standing = Flag.STANDING in stride.flags
         self.steps += 0 if standing else 1
         # No displacement before it: the wearer may turn on the spot
-        begun = t1 - SETTING_OFF_S if Flag.EDGE in stride.flags else t0
+        edge, turn_rad = Flag.EDGE in stride.flags, self.heading_rad(t1) - self.heading_rad(t0)
+        begun = t1 - SETTING_OFF_S if edge else t0
         ahead, aside = self._direction(max(t0, begun), t1)
         length = share * stride.length_m
-        turned_sd = (
-            TURNED_SD * length * abs(self.heading_rad(t1) - self.heading_rad(t0)) if Flag.EDGE in stride.flags else 0.0
-        )
-        if Flag.EDGE not in stride.flags and length > 0.0:
-            length = max(length + self._left_m * (self.heading_rad(t1) - self.heading_rad(t0)), 0.0)
+        turned_sd = TURNED_SD * length * abs(turn_rad) if edge else 0.0
+        if not edge and length > 0.0:
+            length = max(length + self._left_m * turn_rad, 0.0)
         scale_sd = 0.0 if standing else SCALE_SD if self._begun else stride.scale_sd
         self._begun = self._begun or not standing
         sd = math.hypot(stride.length_sd_m, CURVE_SD * length * (1.0 - math.hypot(ahead, aside)), turned_sd)

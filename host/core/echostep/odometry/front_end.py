@@ -76,9 +76,9 @@ class FrontEnd:
     def __init__(
         self, mtx: MtxTiming, ranger: RangerSettings, foot: FootSettings, gait: GaitSettings,
         wearer: WearerSettings | None = None, gyro: GyroSettings | None = None, iron: CompassErrors | None = None,
-        imus: Imus | None = None, watch: WearerWatch | None = None,
+        imus: Imus | None = None,
     ) -> None:  # fmt: skip
-        """`iron`: errors of the compass, if calibrated; `imus`: errors of the six-axis parts; `watch`: observes the wearer."""
+        """`iron`: errors of the compass, if calibrated; `imus`: errors of the six-axis parts."""
         errors = imus or Imus()
         self.board = BoardReader()
         self.foot_source = FootSource(errors.foot)
@@ -89,11 +89,9 @@ class FrontEnd:
         self.heading_fusion = HeadingFusion()
         self.path = TrunkPath(gait)
         self.handover = FootLegsHandover(wearer or WearerSettings(), iron)
-        self.status: messages.Status | None = None
-        self.identity: messages.Identity | None = None
         self.reports = BoardReports()
         self.pings = 0
-        self.watch = watch or WearerWatch()
+        self.watch = WearerWatch()
         self.newest_s = math.nan  # newest time of either port
         self._ranger = ranger
         self.air = Air(ranger.speed_of_sound_m_s)
@@ -151,7 +149,8 @@ class FrontEnd:
         self._bad_times += int((np.isnan(times.board_s) & (board.kind != SILENT)).sum() + np.isnan(times.mtx_s).sum())
         self._advance_clock(times)
         # Board: frames -> reports about itself, pings and heights, blocks of leg gyro samples.
-        self._keep_reports(frames, times)
+        for report in frames.each(_REPORTS):
+            self.reports.add(report)
         self._collect_pings(frames, times)
         leg_blocks = self._gyro_blocks.cut(frames, times)
         for message_index, block in leg_blocks:
@@ -185,15 +184,6 @@ class FrontEnd:
         newest = np.append(times.board_newest_s[-1:], times.mtx_newest_s[-1:])
         if not np.isnan(newest).all():
             self.newest_s = float(np.nanmax(newest))
-
-    def _keep_reports(self, frames: Frames, times: Times) -> None:
-        """Keep the board's newest reports about itself."""
-        for report in frames.each(_REPORTS):
-            self.reports.add(report)
-        if (status := _newest_timed(frames, times, messages.Status)) is not None:
-            self.status = messages.Status.unpack(status)
-        if (identity := _newest_timed(frames, times, messages.Identity)) is not None:
-            self.identity = messages.Identity.unpack(identity)
 
     def _collect_pings(self, frames: Frames, times: Times) -> None:
         """Hand pings without a bus error, and heights by pressure, to the synchronizer, in order of their messages."""
@@ -330,10 +320,3 @@ def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arri
     sync_row, edges = frames.rows(messages.Sync)
     kind[sync_row] = edges["edge"]
     return Arrivals(ticks, chunk_row, t_arrival_ns[chunk_row], kind)
-
-
-def _newest_timed(frames: Frames, times: Times, kind: type[messages.Message]) -> bytes | None:
-    """Body of the last message of a kind that has a time."""
-    frame_row, bodies = frames.rows(kind)
-    timed = np.flatnonzero(~np.isnan(times.board_s[frame_row]))
-    return bodies[timed[-1]].tobytes() if len(timed) else None

@@ -98,12 +98,7 @@ class HeadingFusion:
         known = self._growth < LOST_RAD**2
         joins = known and self._last is not None and self._belt.since_s <= self._last.t_s < t_s
         headings = StanceHeadings(t_s, yaw_rad, angle, self._growth, bias_sd_rad_s, begins=not joins)
-        if (
-            self._filter is None
-            or self._last is None
-            or not joins
-            or not self._correct(self._filter, headings, self._last)
-        ):
+        if not (joins and self._filter and self._last and self._correct(self._filter, headings, self._last)):
             self._keep_foot()
         if headings.begins or self._refused >= REFUSALS:
             headings = headings._replace(begins=True)

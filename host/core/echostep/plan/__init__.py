@@ -9,7 +9,6 @@ from echostep.plan.model import (
     FORMAT_VERSION,
     NO_PLAN,
     Connector,
-    Door,
     Georeference,
     Level,
     Plan,
@@ -21,4 +20,4 @@ from echostep.plan.model import (
     parse_plan,
     sides,
 )
-from echostep.plan.plan_file import ConnectorKind, DoorState
+from echostep.plan.plan_file import ConnectorKind, Door, DoorState

@@ -24,7 +24,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError, replaced
 from echostep.fields import checked, short
 from echostep.plan import plan_file
-from echostep.plan.plan_file import ConnectorFields, DoorFields, LevelFields, PlanFields, QuestionFields, RoomFields
+from echostep.plan.plan_file import ConnectorFields, Door, LevelFields, PlanFields, QuestionFields, RoomFields
 
 FORMAT_VERSION = 1
 # Standard deviation per axis of a drawn storey's places, beyond which it is refused: 95 % are within 2.5 m, a room, assumed
@@ -42,20 +42,6 @@ class Room:
     name: str
     at_m: tuple[float, float]
     outline_m: Floats | None = field(default=None, compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Door:
-    """A gap in the walls; `line`: x0, y0, x1, y1 in metres, from one jamb to the other."""
-
-    line: tuple[float, float, float, float]
-    state: plan_file.DoorState = "unknown"
-    name: str = ""
-
-    @property
-    def width_m(self) -> float:
-        """Distance between the jambs."""
-        return math.dist(self.line[:2], self.line[2:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,12 +253,14 @@ def _plan(tree: Any, digest: str) -> Plan:
 
 
 def _level(fields: LevelFields, where: str) -> Level:
+    for i, door in enumerate(fields.doors):
+        _segments([door.line], f"{where}.doors[{i}].line")
     return Level(
         name=where if fields.name is UNSET else fields.name,
         height_m=fields.height_m,
         walls=_segments(fields.walls, f"{where}.walls"),
         rooms=tuple(_room(room, f"{where}.rooms[{i}]") for i, room in enumerate(fields.rooms)),
-        doors=tuple(_door(door, f"{where}.doors[{i}]") for i, door in enumerate(fields.doors)),
+        doors=tuple(fields.doors),
         windows=_segments(fields.windows, f"{where}.windows"),
         obstacles=tuple(_outline(corners, f"{where}.obstacles[{i}]") for i, corners in enumerate(fields.obstacles)),
         doubtful=_segments(fields.doubtful, f"{where}.doubtful"),
@@ -284,11 +272,6 @@ def _level(fields: LevelFields, where: str) -> Level:
 def _room(fields: RoomFields, where: str) -> Room:
     corners = None if fields.outline is None else _outline(fields.outline, f"{where}.outline")
     return Room(fields.name, fields.at, corners)
-
-
-def _door(fields: DoorFields, where: str) -> Door:
-    _segments([fields.line], f"{where}.line")
-    return Door(fields.line, fields.state, fields.name)
 
 
 def _question(fields: QuestionFields, where: str) -> Question:

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The fields of plan.json: `plan/model.py` makes a `Plan` from them.
 
-In: nothing. Out: structs whose types check and describe each field. Owns the limits.
+In: nothing. Out: structs whose types check and describe each field; `Door`, which is one of them. Owns the limits.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
@@ -32,12 +34,24 @@ class RoomFields(Struct):
     outline: Outline | None = None
 
 
-class DoorFields(Struct):
-    """A gap in the walls."""
+@dataclass(frozen=True, slots=True)
+class Door:
+    """A gap in the walls; `line`: x0, y0, x1, y1 in metres, from one jamb to the other."""
 
     line: Segment
     state: Annotated[DoorState, Meta(description="one of open, closed, unknown")] = "unknown"
     name: Text = ""
+
+    @property
+    def width_m(self) -> float:
+        """Distance between the jambs."""
+        return math.dist(self.line[:2], self.line[2:])
+
+    @property
+    def middle_m(self) -> tuple[float, float]:
+        """The place halfway between the jambs."""
+        x0, y0, x1, y1 = self.line
+        return (x0 + x1) / 2, (y0 + y1) / 2
 
 
 class QuestionFields(Struct):
@@ -61,7 +75,7 @@ class LevelFields(Struct):
     name: Text | UnsetType = UNSET
     height_m: Metres = 0.0
     rooms: list[RoomFields] = []
-    doors: list[DoorFields] = []
+    doors: list[Door] = []
     windows: Segments = []
     obstacles: list[Outline] = []
     doubtful: Segments = []

@@ -50,8 +50,8 @@ class JoinedRecording(Recording):
         """A sentence for each gap in the numbers of the parts, and for a last part that another one follows."""
         numbers = [0, *map(number_of, self.parts)]
         lines = [
-            f"{'parts' if b - a > 2 else 'part'} {a + 1}{f' to {b - 1}' if b - a > 2 else ''} of the run "
-            f"{'are' if b - a > 2 else 'is'} missing: nothing of that time was used"
+            (f"parts {a + 1} to {b - 1} of the run are" if b - a > 2 else f"part {a + 1} of the run is")
+            + " missing: nothing of that time was used"
             for a, b in pairwise(numbers)
             if b - a > 1
         ]

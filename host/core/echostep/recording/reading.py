@@ -116,9 +116,8 @@ class Recording:
         else:
             self._channels.add_summary(ending)
         yield from self._from(file, len(MCAP_MAGIC), self._channels)
-        self.own_damage.truncated = not (
-            self._ended or self._intact or self.grows
-        )  # not for a file that is not read to its end
+        # Not for a file that is not read to its end
+        self.own_damage.truncated = not (self._ended or self._intact or self.grows)
 
     def _from(self, file: Octets, offset: int, channels: PortChannels) -> Iterator[MessageRun | tuple[int, bytes]]:
         """The records from an offset on."""

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Copies of a tracker's state for views.
+"""Copies of a tracker's state, for views and for the next run.
 
-In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothing.
+In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`, `LastPlace`. Owns nothing.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,9 @@ from echostep.aiding import MeetingNews
 from echostep.arrays import Floats, Ints
 from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
-from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization import Estimate, MapFilter
+from echostep.height.levels import Air
+from echostep.localization import Estimate, MapFilter, TrackStatus
 from echostep.odometry import Alarm, FrontEndCounts
 from echostep.particles.kernels import systematic
 from echostep.path import PathSegment
@@ -60,7 +61,7 @@ class TrackerState:
 class StreamState:
     """Counts of each input stream since the start, and the newest reports of the board.
 
-    `status`, `identity`: the newest with a plausible time. `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
+    `synchronised`: SyncOut edges time the MTx samples. `mtx`: also of a foot board's samples;
     `foot_reports`: a foot board's reports about itself, None if an MTx is worn.
     """
 
@@ -71,8 +72,6 @@ class StreamState:
     pings: int
     synchronised: bool
     board_restarts: int
-    status: Status | None
-    identity: Identity | None
     reports: BoardReports
     foot_reports: BoardReports | None
 
@@ -99,3 +98,22 @@ class ParticleSnapshot:
             return cls(cloud.map_x_m.copy(), cloud.y_m.copy(), cloud.level.copy(), log_weight)
         chosen = systematic(cloud.weight, 0.5, most)
         return cls(cloud.map_x_m[chosen], cloud.y_m[chosen], cloud.level[chosen], np.zeros(most))
+
+
+@dataclass(frozen=True, slots=True)
+class LastPlace:
+    """A place (m) on a level that the tracker was sure of, `sd_m` its standard deviation per axis; `air`: of the barometer that was worn."""
+
+    x_m: float
+    y_m: float
+    sd_m: float
+    level: int
+    air: Air | None = None
+
+    @classmethod
+    def of(cls, estimate: Estimate | None, air: Air | None) -> LastPlace | None:
+        """The place of an estimate; None unless its status is `tracking`."""
+        if estimate is None or estimate.status is not TrackStatus.TRACKING:
+            return None
+        sd_m = math.sqrt(0.5 * (estimate.xx_m2 + estimate.yy_m2))
+        return cls(estimate.x_m, estimate.y_m, sd_m, estimate.level, air)

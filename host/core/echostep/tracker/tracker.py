@@ -44,8 +44,7 @@ from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
 from echostep.settings import Settings
 from echostep.tracker import kernels
 from echostep.tracker.before_check_in import BeforeCheckIn
-from echostep.tracker.last_place import LastPlace, last_place
-from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
+from echostep.tracker.state import LastPlace, ParticleSnapshot, StreamState, TrackerState
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, waiting for their segment; beyond it the oldest are dropped, assumed
@@ -141,8 +140,6 @@ class Tracker:
             pings=front_end.pings,
             synchronised=front_end.timeline.synchronised,
             board_restarts=front_end.timeline.board_restarts,
-            status=front_end.status,
-            identity=front_end.identity,
             reports=replace(reports, gyros=dict(reports.gyros)),
             foot_reports=replace(front_end.foot_source.board.reports) if front_end.foot_source.port == FOOT else None,
         )
@@ -167,7 +164,7 @@ class Tracker:
 
     def last_place(self) -> LastPlace | None:
         """The start of the next run; None unless the status of the newest estimate is `tracking`."""
-        return last_place(self._estimate, None if self.filter is None else self.filter.cloud.air)
+        return LastPlace.of(self._estimate, None if self.filter is None else self.filter.cloud.air)
 
     def arrival_ns(self, t_s: float) -> int:
         """Arrival time, on the host's clock, of undelayed bytes about `t_s`; 0 before any bytes have come."""
@@ -193,9 +190,14 @@ class Tracker:
         """Process many chunks; the estimates are the same as for the chunks one by one."""
         estimates: list[Estimate] = []
         for piece in portion.cut_after(GATEWAY, TEAM_BEACONS, MEETING, PERSON):
-            estimates += self._track(piece)
-            if len(piece.of(TEAM_BEACONS).row):
-                self._team_beacons.receive(piece.of(TEAM_BEACONS).received, len(self.plan.levels))
+            # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
+            estimates += self._published(self.front_end.process(piece))
+            # Beacons: bytes of the gateway -> readings, used from the next piece on.
+            if received := piece.of(GATEWAY).received:
+                self._readings += self.gateway.read(received, self.front_end.newest_s)
+            # Team: beacons that teammates have placed, meetings with them, check-ins.
+            if len((shared := piece.of(TEAM_BEACONS)).row):
+                self._team_beacons.receive(shared.received, len(self.plan.levels))
             self.watch.advance()
             for port, apply in ((MEETING, self._receive_meeting), (PERSON, self._apply_person)):
                 message = piece.of(port)
@@ -208,15 +210,6 @@ class Tracker:
         kernels.foot()
         kernels.board_and_clocks()
         self._new_filter(self.start or Start(), 0.0, np.random.default_rng(0)).update(kernels.measured())
-
-    def _track(self, portion: Portion) -> list[Estimate]:
-        """Estimates from a portion in which only the last chunk may be the gateway's: its readings are used from the next portion on."""
-        # Odometry: chunks -> segments of the trunk's path with their pings, and dropouts.
-        estimates = self._published(self.front_end.process(portion))
-        # Beacons: bytes of the gateway -> readings.
-        if received := portion.of(GATEWAY).received:
-            self._readings += self.gateway.read(received, self.front_end.newest_s)
-        return estimates
 
     def _published(self, pieces: list[MeasuredSegment | Dropout]) -> list[Estimate]:
         """Estimates of new segments, and after dropouts."""

@@ -25,9 +25,8 @@ MAX_GAP = 500
 # The state of the gates; -1: none. ACCEPTED: last accepted counter. DEVICE: bus of the followed device. OTHER, OTHERS: last counter of a message
 # that is no sample, and how many of them came since ACCEPTED.
 ACCEPTED, DEVICE, OTHER, OTHERS = range(4)
-_ACCEL, _GYRO, _MAG, _ATTITUDE, _GROUPS = range(
-    5
-)  # groups of values: columns of `Decoded.sent` and entries of the limits; their number
+# Groups of values: columns of `Decoded.sent` and entries of the limits; their number
+_ACCEL, _GYRO, _MAG, _ATTITUDE, _GROUPS = range(5)
 _BEGIN = (ACCEL.start, GYRO.start, MAG.start, ATTITUDE.start, ATTITUDE.stop)  # first column of each group, and the end
 _Q = ATTITUDE.start  # column of the quaternion's w
 

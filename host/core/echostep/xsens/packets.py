@@ -50,11 +50,7 @@ INTEGERS = {  # packets of integers: name, layout, fields
     0x10A0: ("SampleTime64", ">Q", ("",)),
     0x3010: ("BaroPressure", ">I", ("",)),
     0x7010: ("GNSSPVTData", ">IHBBBBBBIiBBBBiiiiIIiiiiiIIi7H", tuple(_PVT.split())),
-    0xA010: (
-        "RawAccGyrMagTemp",
-        ">10H",
-        tuple(_RAW.split()),
-    ),
+    0xA010: ("RawAccGyrMagTemp", ">10H", tuple(_RAW.split())),
     0xA030: ("RawAcc", ">3H", tuple("XYZ")),
     0xA040: ("RawGyr", ">3H", tuple("XYZ")),
     0xA050: ("RawMag", ">3H", tuple("XYZ")),

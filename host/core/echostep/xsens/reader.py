@@ -28,9 +28,8 @@ from echostep.xsens.frames import (
     encode_frame,
 )
 from echostep.xsens.gates import Messages, apply_gates, joined
-from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata, pack_mtdata
+from echostep.xsens.mtdata import Decoded, MtSample, OutputFormat, decode_mtdata, pack_mtdata
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
-from echostep.xsens.sample import MtSample
 
 HELD = 10  # equal samples in a row, which coarse digits may give at rest; assumed
 
@@ -180,9 +179,6 @@ class MtxReader:
     def _decode(self, frames: MtFrames) -> Messages:
         """Values of all measurement messages in order; other messages are counted."""
         legacy = (frames.mid == MTDATA) & (frames.length == self._output.length)
-        if legacy.all():
-            rows = copy_payloads(frames.stream, frames.body, self._output.length)
-            return Messages(*decode_mtdata(rows, self._output), frames.bus, frames.end)
         self._count_others(frames)
         count = len(frames.mid)
         decoded = Decoded(np.empty((count, mt.COLUMNS)), np.empty(count, np.int64), np.empty((count, 4), np.bool_))

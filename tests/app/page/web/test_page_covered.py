@@ -19,9 +19,9 @@ from echostep_app.plan.routing import RoutePlace
 from echostep_app.team.messages.crews import Crew
 from echostep_app.team.messages.report import ReportedAlarm
 from operation.teams import TOWER, ServedTeam, Team, place
-from page.browser import READY, TABLE_READY, loaded_page, wait_for
+from page.browser import READY, TABLE_READY, wait_for
 from page.frames import PLAN, scene, served, told
-from page.web.test_page_sizes import RATES, RUNNING, moments
+from page.web.test_page_sizes import RATES, RUNNING, moments, opened
 from plan.imported_plans import seven_floors
 from waiting import until
 
@@ -40,10 +40,6 @@ EVERY_MESSAGE = """() => { for (const id of ['silence', 'outbox', 'fault', 'hint
     element.textContent ||= 'No answer from echostep live since 12:34:56. Is it running, and in reach?';
     element.hidden = false;
 } }"""
-
-
-def opened(browser: Any, url: str, size: tuple[int, int], ready: str) -> Any:
-    return loaded_page(browser, url, {"viewport": {"width": size[0], "height": size[1]}}, ready)
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -15,6 +15,7 @@ from ezdxf.filemanagement import new
 from ezdxf.math import Matrix44
 
 from plan.drawings.drawn_doors import PLAIN, Box, Doors, Layer, Leaf, Point, usual
+from plan.drawings.drawn_houses import corners
 
 Walls = Callable[[Any, Box, Layer], None]
 
@@ -47,11 +48,6 @@ def gaps() -> list[Leaf]:
     rows = [Leaf((a, LOW), (1.0, 0.0), north, b - a, INNER) for a, b in LOW_GAPS]
     rows += [Leaf((b, UP), (-1.0, 0.0), south, b - a, INNER) for a, b in UP_GAPS]
     return [*rows, Leaf((OUTER, ENTRANCE[0]), north, east, ENTRANCE[1] - ENTRANCE[0], OUTER)]
-
-
-def corners(box: Box) -> list[Point]:
-    x0, y0, x1, y1 = box
-    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
 
 
 def axis(box: Box) -> tuple[Point, Point, float]:

@@ -232,10 +232,8 @@ def foot_celsius(counts: int) -> float:
 
 def _is_unmoved(health: GyroHealth) -> bool:
     """Whether the self-test did not change the gyro's rate."""
-    return (
-        health.self_test == SelfTest.FAILED
-        and max(abs(health.response_st1), abs(health.response_st2)) <= UNMOVED_COUNTS
-    )
+    largest = max(abs(health.response_st1), abs(health.response_st2))
+    return health.self_test == SelfTest.FAILED and largest <= UNMOVED_COUNTS
 
 
 def _temperature_findings(name: str, health: GyroHealth) -> list[Finding]:

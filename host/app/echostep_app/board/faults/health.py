@@ -114,11 +114,8 @@ def board_findings(reports: BoardReports) -> list[Finding]:
     """Findings by the board's reports, the most severe first; empty without problems or before the first report."""
     findings = restart_findings(reports) + supply_findings(reports) + gyro_findings(reports) + foot_findings(reports)
     if reports.status is not None:
-        findings += (
-            device_findings(reports, reports.status)
-            + _intermittent_findings(reports)
-            + _loss_findings(reports.status, reports.previous_status)
-        )
+        findings += device_findings(reports, reports.status) + _intermittent_findings(reports)
+        findings += _loss_findings(reports.status, reports.previous_status)
     if reports.foot is not None:
         findings = [replace(f, subject="foot board") if f.subject == "board" else f for f in findings]
     return sorted(findings, key=lambda finding: -finding.severity)
@@ -158,16 +155,13 @@ def _loss_findings(status: Status, previous: Status | None) -> list[Finding]:
     findings = []
     span = f"in the last {span_s(status, previous):.0f} s"
     if dropped := sum(increase(status, previous, n) for n in Status._fields if n.startswith("dropped_")):
-        what, remedy = (
-            f"dropped {dropped} messages {span}",
-            "the host reads too slowly: close other programs, avoid a USB hub",
-        )
+        what = f"dropped {dropped} messages {span}"
+        remedy = "the host reads too slowly: close other programs, avoid a USB hub"
         findings.append(Finding(Severity.WARNING, "board", what, remedy))
     if recovered := increase(status, previous, "bus_recoveries"):
         what = f"was stuck and recovered {recovered} times {span}"
-        findings.append(
-            Finding(Severity.WARNING, "I2C bus", what, "check the pull-ups (2.2 kohm) and keep the cables short")
-        )
+        remedy = "check the pull-ups (2.2 kohm) and keep the cables short"
+        findings.append(Finding(Severity.WARNING, "I2C bus", what, remedy))
     if bad := increase(status, previous, "bad_frames"):
         what = f"got {bad} damaged commands {span}"
         findings.append(Finding(Severity.WARNING, "board", what, "close other programs that write to its port"))
@@ -184,17 +178,14 @@ def expected_rates(reports: BoardReports) -> dict[str, float]:
     mode = PressureMode.HIGH_SPEED if c is None else PressureMode(c.pressure_mode)
     compass = "Magnetic" if part_in(reports, Healthy.COMPASS) is Part.LIS3MDL else "Compass"
     rangers = (on & (Sensors.RANGER_LEFT | Sensors.RANGER_RIGHT)).bit_count()
+    gyros = on & (Sensors.THIGH | Sensors.CALF | Sensors.BELT)
     kinds = [part_in(reports, d) for d in (Healthy.RANGER_LEFT, Healthy.RANGER_RIGHT)]
     pings_hz = MAXSONAR_PINGS_HZ if Part.MAXSONAR in kinds else PINGS_HZ
     return {
         name: rate
         for name, rate, there in (
             ("Ping", pings_hz[schedule] * rangers / 2, rangers),
-            (
-                "Gyros",
-                DEFAULT_GYROS_HZ if c is None else float(c.gyro_rate_hz),
-                on & (Sensors.THIGH | Sensors.CALF | Sensors.BELT),
-            ),
+            ("Gyros", DEFAULT_GYROS_HZ if c is None else float(c.gyro_rate_hz), gyros),
             (compass, DEFAULT_COMPASS_HZ if c is None else float(c.compass_rate_hz), on & Sensors.COMPASS),
             ("Pressure", PRESSURE_HZ[mode], on & Sensors.PRESSURE),
         )

@@ -70,11 +70,8 @@ def segments_of(recording: Recording) -> list[MeasuredSegment]:
         raise EchostepError(f"{recording.path}: only {way_m:.1f} m of steps in it: walk past the walls, then draw them")
     if not any(np.isfinite(s.range_m).any() for s in segments):
         imported = recording.metadata.get("note", "").endswith("no other sensor")
-        why = (
-            "it is a foot's alone, and walls are drawn from echoes"
-            if imported
-            else "echostep doctor examines the rangers"
-        )
+        foot_alone = "it is a foot's alone, and walls are drawn from echoes"
+        why = foot_alone if imported else "echostep doctor examines the rangers"
         raise EchostepError(f"{recording.path}: no echo in it: {why}")
     return segments
 

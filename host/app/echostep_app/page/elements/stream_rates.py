@@ -53,7 +53,7 @@ class StreamRateMeter:
     def measure(self, tracker: Tracker, t_ns: int, fault: str = "") -> StreamRates:
         """Rates and counts at `t_ns` of the arrival clock, which must not go back; `fault`: of the run's output."""
         streams = tracker.streams
-        board, mtx, status = streams.board, streams.mtx, streams.status
+        board, mtx = streams.board, streams.mtx
         mtx_hz, pings_hz = self._rates_hz(mtx.good, streams.pings, t_ns)
         if mtx_hz != 0.0:
             self._unused = _unused(mtx)
@@ -65,11 +65,10 @@ class StreamRateMeter:
             pings_hz if has_board else None,
             _unused(mtx) - self._unused,
         )
-        dropped = 0 if status is None else sum(v for k, v in status._asdict().items() if k.startswith("dropped_"))
         return StreamRates(
             mtx_hz=mtx_hz,
             pings_hz=pings_hz if has_board else None,
-            lost=board.lost + mtx.lost + dropped,
+            lost=board.lost + mtx.lost + streams.reports.dropped,
             rejected=board.rejected + mtx.bad_checksum + mtx.bad_length + mtx.incomplete,
             late_pings=streams.front_end.late_pings,
             synchronised=streams.synchronised,

@@ -105,8 +105,7 @@ def door_faces(doors: Sequence[Door], faces: Faces) -> list[tuple[int, int]]:
 
 def beside(door: Door, by_m: float = BESIDE_M) -> tuple[tuple[float, float], tuple[float, float]]:
     """The points `by_m` from a door's middle, on its two sides."""
-    x0, y0, x1, y1 = door.line
-    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    (x0, y0, x1, y1), (x, y) = door.line, door.middle_m
     u, v = (by_m * d / door.width_m for d in (y1 - y0, x0 - x1))
     return (x + u, y + v), (x - u, y - v)
 

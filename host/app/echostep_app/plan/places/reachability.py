@@ -37,12 +37,8 @@ def unreachable_rooms(plan: Plan, faces: Sequence[Faces]) -> Iterator[PlanFindin
     pairs = [door_faces(level.doors, of) for level, of in zip(plan.levels, faces, strict=True)]
     if len(pairs) > 1 and any(pairs) and not any(OUTSIDE in pair for level in pairs for pair in level):
         i = next(i for i, level in enumerate(pairs) if level)  # one level may be a part of a house
-        yield PlanFinding(
-            "no exit",
-            i,
-            beside(plan.levels[i].doors[0])[0],
-            "no door and no gap leads outside: the building has no exit",
-        )
+        words = "no door and no gap leads outside: the building has no exit"
+        yield PlanFinding("no exit", i, beside(plan.levels[i].doors[0])[0], words)
     for i, level in enumerate(plan.levels):
         with_door = {f for pair in pairs[i] for f in pair}
         closed = [room for k, room, f in apart if k == i and f not in with_door]

@@ -87,11 +87,8 @@ def _board(options: DemoOptions) -> Board:
     command = options.board_command
     player = "the real firmware in the simulator" if command else "the Python board, not the real firmware"
     board = BoardProcess(shlex.split(command)) if command else PythonBoard(seed=options.seed)
-    parts = (
-        "of 2026, not built yet, and a second one is on the foot"
-        if options.kit is Kit.OF_2026
-        else "of the papers, the default"
-    )
+    of_2026 = "of 2026, not built yet, and a second one is on the foot"
+    parts = of_2026 if options.kit is Kit.OF_2026 else "of the papers, the default"
     console.print(f"A simulated walk in a simulated building; the sensor board is {player}, with the parts {parts}.")
     return board
 

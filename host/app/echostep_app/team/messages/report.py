@@ -284,9 +284,8 @@ def is_printable(text: str) -> bool:
     return all(unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp") for c in text)
 
 
-@lru_cache(
-    maxsize=4096
-)  # each member's last report is asked several times at each look; two times a report, 256 members
+# Each member's last report is asked several times at each look; two times a report, 256 members
+@lru_cache(maxsize=4096)
 def _unix(text: str) -> float:
     try:
         seconds = datetime.fromisoformat(text)
