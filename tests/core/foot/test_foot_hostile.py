@@ -13,7 +13,6 @@ from hypothesis.extra.numpy import arrays
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
-from echostep.path import UNOBSERVED_SD_M
 from foot import foot_walks as fw
 from foot.foot_walks import moves, same, walking
 
