@@ -13,7 +13,6 @@ from hypothesis.extra.numpy import arrays
 
 from echostep.arrays import Floats
 from echostep.foot.steps import Foot, walk_track
-from echostep.path import UNOBSERVED_SD_M
 from foot import foot_walks as fw
 from foot.foot_walks import moves, same, walking
 
@@ -61,6 +60,18 @@ def test_a_gap_makes_it_unsure_and_it_recovers(gap_s: float) -> None:
     assert max(step.covariance[0, 0] for step in after) < 0.05
 
 
+@pytest.mark.parametrize("gap_s", [0.4, 2.2, 4.4])
+def test_who_walked_walks_on_where_samples_are_missing(gap_s: float) -> None:
+    """The step over the gap is as long as the way at the pace before, and known to this."""
+    t, accel, gyro = walking(16)
+    begin = 2.0 + 4 * 1.1
+    kept = (t < begin) | (t > begin + gap_s)
+    track = walk_track(t[kept], accel[kept], gyro[kept])
+    off = track.position_m[-1] - walk_track(t, accel, gyro).position_m[-1]
+    sd = math.sqrt(max(step.covariance[0, 0] for step in track.steps))
+    assert math.hypot(*off[:2]) < 2.0 * sd < 1.0 + 2.0 * gap_s
+
+
 def test_a_hole_in_a_swing_is_no_observed_step() -> None:
     """A tenth of a second without samples: the step was a metre off, and was said to be known to 0.2 m."""
     t, accel, gyro = walking(12)
@@ -69,7 +80,9 @@ def test_a_hole_in_a_swing_is_no_observed_step() -> None:
     track = walk_track(t[kept], accel[kept], gyro[kept])
     (across,) = (step for step in track.steps if step.t_start_s < swing < step.t_end_s)
     assert track.counts.gaps == 1
-    assert across.covariance[0, 0] > UNOBSERVED_SD_M**2
+    off_m = math.hypot(across.move_m[0], across.move_m[1]) - 1.3
+    assert abs(off_m) < 1.5 * math.sqrt(across.covariance[0, 0])
+    assert across.covariance[0, 0] > 0.4**2
 
 
 def test_a_clock_that_is_set_back_is_followed() -> None:

@@ -74,3 +74,16 @@ def test_without_compass_it_counts_from_zero_and_says_how_well() -> None:
     found = Heading(HeadingSettings()).feed(t, np.full_like(t, 0.1), np.full_like(t, np.nan))
     assert found[-1, 0] == pytest.approx(0.1 * 59.99, rel=1e-6)
     assert found[-1, 1] > math.radians(45)
+
+
+@pytest.mark.parametrize("has_compass", [True, False])
+def test_a_gap_is_not_turned_through_at_the_rate_after_it(has_compass: bool) -> None:
+    """Three seconds are missing in a turn: the compass then gives the heading at once; without one it is as before, and unsure."""
+    t = np.concatenate([np.arange(0.0, 5.0, 0.01), np.arange(8.0, 12.0, 0.01)])
+    true, turning = np.where(t < 6.0, 0.0, 1.5), np.where(abs(t - 6.5) < 1.6, 1.0, 0.0)
+    compass = np.where(np.arange(len(t)) % 10 == 0, true if has_compass else np.nan, np.nan)
+    ours = Heading()
+    found = ours.feed(t, turning, compass)
+    assert found[510:, 0] == pytest.approx(np.full(len(t) - 510, 1.5 if has_compass else 0.0) + 0.09, abs=0.15)
+    assert found[500, 1] == pytest.approx(math.radians(8.0) if has_compass else 0.9, rel=0.1)
+    assert ours.unbroken_s >= 8.0

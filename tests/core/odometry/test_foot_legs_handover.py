@@ -195,6 +195,20 @@ def test_a_plug_that_is_loose_again_and_again_is_bridged_by_the_legs() -> None:
     assert np.mean([e.status is TrackStatus.TRACKING for e in estimates]) > 0.9
 
 
+@pytest.mark.parametrize("seed", [1, 6])
+def test_both_plugs_are_loose_in_turn(seed: int) -> None:
+    """The board's six seconds after the MTx's: what neither has seen is unsure, and what both have seen makes one heading of theirs again."""
+    scenario, chunks = walked(seed)
+    for port, begin_s in ((MTX, 20.0), (BOARD, 26.0)):
+        for k in range(5):
+            chunks = tuple(without(chunks, port, begin_s + 12.0 * k, begin_s + 1.0 + 13.0 * k))
+    estimates, error = tracked(scenario, list(chunks))
+    sure = np.array([e.status is TrackStatus.TRACKING for e in estimates])
+    assert error[sure].max() < 1.0
+    assert sure.mean() > 0.6
+    assert error[-1] < 0.5
+
+
 @pytest.mark.parametrize("seed", [2, 3, 6, 9])
 def test_the_board_alone_is_enough(seed: int) -> None:
     """No MTx at all: one cable. Never a wrong place that is shown as sure."""

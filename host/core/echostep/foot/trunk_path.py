@@ -20,6 +20,7 @@ import numpy as np
 from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.foot.steps import Stance, Step
+from echostep.foot.zupt_ins import GAP_S
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 # The source of these limits is not recorded.
@@ -59,7 +60,8 @@ class TrunkPath:
         self._rests_s: deque[float] = deque(maxlen=RUN_MEMORY)
         self._toe = ToeAngle()
         self.steps = 0
-        self._stood_s = math.inf  # last moment of a stance
+        self._stood_s = math.inf  # last moment of a stance, or first one after a gap
+        self._seen_s = math.inf  # newest sample
         self.doubts: list[str] = []  # of the newest step
         self._scale_sd = KNOWN_SCALE_SD
 
@@ -69,7 +71,7 @@ class TrunkPath:
             heading = float(foot_heading_rad[0]) + self._toe.angle_rad
             self._anchor = (float(t_s[0]), *self._trunk_xy(heading), heading)
         if len(t_s):
-            self._stood_s = float(t_s[-1])
+            self._stood_s = self._seen_s = float(t_s[-1])
         segments: list[tuple[int, PathSegment]] = []
         until_s = t_s - self._half_s()
         while self._anchor is not None:
@@ -82,6 +84,10 @@ class TrunkPath:
 
     def add_flight(self, t_s: Floats) -> list[tuple[int, PathSegment]]:
         """Segments of a foot that is off the floor at all times `t_s` (n,), from ALOFT_S on, each with the index of the sample that completes it."""
+        gaps = np.flatnonzero(np.diff(t_s, prepend=self._seen_s) > GAP_S)
+        if len(gaps):
+            self._stood_s = float(t_s[gaps[-1]])
+        self._seen_s = float(t_s[-1]) if len(t_s) else self._seen_s
         segments: list[tuple[int, PathSegment]] = []
         while self._anchor is not None:
             due_s = max(self._stood_s + ALOFT_S, self._anchor[0] + STANDING_PIECE_S)
@@ -116,7 +122,7 @@ class TrunkPath:
             step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad
         )
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
-        aloft = step.t_end_s - step.t_start_s > ALOFT_S  # its length, and so the scale, says little
+        aloft = step.t_end_s - max(step.t_start_s, self._stood_s) > ALOFT_S  # its length, and so the scale, says little
         before, self._scale_sd = self._scale_sd, max(self._scale_sd, 0.0 if aloft else step.scale_sd)
         growth = math.sqrt(self._scale_sd**2 - before**2)
         return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth, aloft=aloft)]

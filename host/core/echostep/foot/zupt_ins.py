@@ -28,7 +28,9 @@ GAP_S = 0.25  # shorter gaps are propagated over
 # The same for a moving foot: its speed changes by metres per second in a tenth of a second; assumed
 MOVING_GAP_S = 0.08
 STRAY_SAMPLES = 20  # this many samples in a row with earlier times: the clock was set back
-WALK_M_S = 1.5  # mean speed of a foot while samples are missing, 1 sd
+# Of a wearer while samples are missing, assumed: 1/e time of his pace before; 1 sd of what he does beside that, and of his foot beside him
+GOES_ON_S, WALK_M_S, BESIDE_M = 4.0, 0.6, 0.4
+START_M_S = 1.5  # of a foot that is levelled though it may move, 1 sd
 MOST_M_S = 20.0  # of a sprinter's foot in its swing
 MAX_ACCEL_M_S2, MAX_RATE_RAD_S = 1e3, 1e2  # beyond any foot
 STEEP_M_S2, STEEP_RAD_S = 15.0, 4.0  # equal readings beyond these are a sensor at its limit, not a coincidence
@@ -139,17 +141,21 @@ def _find_level(foot: ZuptInsState, sample: ImuSample, output: Output) -> None:
         _begin_stance(s, nav, t_s - s.still_s, output)
     elif s.waited_s >= IMPATIENT_S and stillness < 1.0:
         ins.set_level(nav, force, s.yaw_rad, False)
-        _start_navigation(s, nav, t_s, UNSURE_TILT_RAD, WALK_M_S)
+        _start_navigation(s, nav, t_s, UNSURE_TILT_RAD, START_M_S)
         _begin_stance(s, nav, t_s, output)
 
 
 @lean_part
 def _start_navigation(s: ZuptState, nav: Nav, t_s: float, tilt_sd_rad: float, velocity_sd_m_s: float) -> None:
-    """Start navigation at this sample; the unobserved time goes into the position's covariance."""
+    """Start navigation at this sample. In the unobserved time the wearer went on at his pace, and slowed down."""
     ins.set_covariance(nav, tilt_sd_rad, velocity_sd_m_s, nav.noise.gyro_bias, nav.noise.accel_bias)
-    lost_s = s.lost_s + s.waited_s if s.lost_s > 0.0 else 0.0
-    for i in range(3):
-        nav.P[POS + i, POS + i] = (WALK_M_S * lost_s) ** 2
+    if s.lost_s > 0.0:
+        lost_s = s.lost_s + s.waited_s
+        pace_s = max(s.stride_s, t_s - lost_s - s.stance_begin_s)
+        for_s = GOES_ON_S * (1.0 - math.exp(-lost_s / GOES_ON_S))
+        for i in range(3):
+            nav.position[i] += for_s * s.stride_m[i] / pace_s if s.stride_s > 0.0 else 0.0
+            nav.P[POS + i, POS + i] = BESIDE_M**2 + (WALK_M_S * lost_s) ** 2
     s.lost_s = 0.0
     s.levelled = 1
     s.rest_end_s = t_s
@@ -277,6 +283,9 @@ def _begin_stance(s: ZuptState, nav: Nav, begin_s: float, output: Output) -> Non
     """Begin a stance; write the step that led to it if there was a stance before."""
     s.in_stance = 1
     s.settled = 0
+    s.stride_s = begin_s - s.stance_begin_s if s.walking else 0.0
+    for i in range(3):
+        s.stride_m[i] = nav.position[i] - s.origin[i]
     s.stance_begin_s = max(begin_s, s.stance_end_s) if s.walking else begin_s
     s.rest_yaw_rad = ins.heading(nav)
     s.stance_tilt[0], s.stance_tilt[1], s.stance_tilt[2] = mounting.tilt(nav)

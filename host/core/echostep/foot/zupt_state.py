@@ -55,6 +55,8 @@ class ZuptState(Protocol):
     stance_end_s: float  # of the stance before
     walking: int  # whether there was a stance before
     origin: Floats  # position at the last reported step
+    stride_m: Floats  # the last step, and the time from stance to stance; 0: none yet
+    stride_s: float
     yaw_variance: float  # at the last reported step
     stray: int
     samples: int

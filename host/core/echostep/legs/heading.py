@@ -21,6 +21,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
+from echostep.legs.angle_grid import LONGEST_GAP_S
 
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
 SIZE = 6
@@ -94,6 +95,7 @@ class Heading:
             self.state[HEADING] = heading_rad
         self.read = self.refused = 0
         self._t_s: float | None = None
+        self.unbroken_s = -math.inf  # since the newest gap, and since the compass then gave the heading anew
         self._since_s = 0.0  # since P was propagated
         self._turned = 0.0  # by the gyro since the last reading of the compass
         self._last: tuple[float, float] | None = None  # time and heading of the last reading of the compass
@@ -130,15 +132,18 @@ class Heading:
         return CompassErrors(b, c, d, e)
 
     def _propagate(self, t_s: float, rate: float) -> None:
-        """Turn the heading by one rate; a missing one (NaN) inflates its variance."""
+        """Turn the heading by one rate; a missing one (NaN, or after a gap) inflates its variance."""
         if self._t_s is None or t_s <= self._t_s:
             self._t_s = t_s if self._t_s is None else self._t_s
             return
         dt, self._t_s = t_s - self._t_s, t_s
-        turned = 0.0 if math.isnan(rate) else (rate - float(self.state[BIAS])) * dt
+        if is_gap := dt > LONGEST_GAP_S:
+            self.known, self.unbroken_s = self._given, t_s
+        is_missing = is_gap or math.isnan(rate)
+        turned = 0.0 if is_missing else (rate - float(self.state[BIAS])) * dt
         self.state[HEADING] += turned
         self._turned += turned
-        if math.isnan(rate):
+        if is_missing:
             self.P[HEADING, HEADING] += MISSING_WALK_RAD**2 * dt
         elif not self._has_rate:
             self._start_gyro()
@@ -185,13 +190,13 @@ class Heading:
             self._update(row, innovation, self.settings.rest_sd_rad_s**2)
 
     def _compass_update(self, t_s: float, compass: float) -> None:
-        """One reading of the compass: the first one sets an unknown heading; a later one must be steady and within the gate."""
+        """One reading of the compass: the first one, also after a gap, sets an unknown heading; a later one must be steady and within the gate."""
         self.read += 1
         self._propagate_covariance()
         heading = float(self.state[HEADING])
         if not self.known:
-            self.known = True
-            self.state[HEADING] = heading = compass
+            self.known, self.unbroken_s = True, t_s
+            self.state[HEADING] += wrap(compass - heading)
             self.P[HEADING] = self.P[:, HEADING] = 0.0
             self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
             self._last, self._turned = (t_s, compass), 0.0

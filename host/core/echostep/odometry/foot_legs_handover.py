@@ -192,8 +192,11 @@ class FootLegsHandover:
         if span_s > BRIEF_S:
             sd_m = max(sd_m, 1.01 * UNOBSERVED_SD_M)  # makes the segment an unobserved one
         heading_rad = self._leg_path.heading_rad(self._covered_s) + self._leg_turn_rad - self._foot_turn_rad
+        turn_sd = self._leg_path.unseen_sd_rad(first.t0_s)
         return [
-            PathSegment(self._covered_s, first.t0_s, 0.0, 0.0, heading_rad, first.heading0_rad, sd_m, 0.0, first.step)
+            PathSegment(
+                self._covered_s, first.t0_s, 0.0, 0.0, heading_rad, first.heading0_rad, sd_m, turn_sd, first.step
+            )
         ]
 
     def _append(self, segment: PathSegment, turn_rad: float) -> PathSegment:
