@@ -17,6 +17,8 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.height.levels import HeightChange
+from echostep.particles.limits import HALF_STOREY_M
+from echostep.plan import ANY_LEVEL
 
 # Spectral density of the acceleration: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
 STARTING_M2_S3 = 0.2
@@ -27,6 +29,10 @@ CLIMB_M_S = 0.5  # standard deviation of a climb that no foot measured, in a sec
 UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure: any place on earth
 # Assumed, not measured: how long a rise is kept in mind (weather, the foot's drift); sd of its difference by foot and pressure (draughts, noise)
 KEPT_S, ALIKE_M = 10.0, 0.25
+# Of the height by pressure against a level: how long a difference is kept in mind; its sd by draughts, doors and weather in this time, 6 Pa; speeds
+# on stairs and of lifts: a faster change is the door of a stairwell under pressure, 20 to 50 Pa [EN 12101-6]
+OFF_KEPT_S, OFF_SD_M, CLIMBING_M_S, RIDING_M_S = 60.0, 0.5, 0.5, 3.0
+RESTING_M = 0.2  # longest way of a trunk that may ride
 
 
 class RidingHeight:
@@ -123,3 +129,30 @@ class LiftedFoot:
         now = 0.5 * (max(self._felt_m - max(self._risen_m, 0.0), 0.0) / ALIKE_M) ** 2
         self.evidence = max(now, was) if now > 0.5 else now
         return max(self.evidence - was, 0.0)
+
+
+class OffLevel:
+    """`off_m`: how far the height by pressure has left the level that is believed; from half a storey on it stays, whatever the weather."""
+
+    def __init__(self) -> None:
+        self.off_m, self._level = 0.0, ANY_LEVEL
+        self._height_m, self._starts, self._z_m = math.nan, 0, 0.0
+
+    @property
+    def evidence(self) -> float:
+        """Half the squared, normalized height above the level or below it."""
+        return 0.5 * (self.off_m / OFF_SD_M) ** 2
+
+    def update(self, change: HeightChange, way_m: float, barometer_starts: int, level: int, z_m: float) -> None:
+        """Of a segment with a way of this length; `level` and height in the plan of the trunk before it; ANY_LEVEL: none is believed."""
+        if math.isinf(change.height_sd_m):
+            return
+        if level not in (self._level, ANY_LEVEL):
+            self._level, self.off_m = level, 0.0
+        elif level != ANY_LEVEL and barometer_starts == self._starts:
+            risen_m = change.height_m - self._height_m
+            if abs(self.off_m) < HALF_STOREY_M:
+                self.off_m *= math.exp(-change.span_s / OFF_KEPT_S)
+            if abs(risen_m) < (RIDING_M_S if way_m < RESTING_M else CLIMBING_M_S) * change.span_s:
+                self.off_m += risen_m - (z_m - self._z_m)
+        self._height_m, self._starts, self._z_m = change.height_m, barometer_starts, z_m

@@ -114,7 +114,7 @@ class MapFilter:
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         # 1. The trunk may have moved though no step was measured.
-        measured = self._unmeasured.weighed(measured)
+        measured = self._unmeasured.weighed(measured, *self._level())
         segment, belief, away = measured.segment, self.belief, self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
@@ -279,6 +279,12 @@ class MapFilter:
         cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
         return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
 
+    def _level(self) -> tuple[int, float]:
+        """The level that is believed, if there are levels, and the mean height of the tracked cloud (m)."""
+        cloud, shares = self.cloud, self.cloud.level_shares
+        is_known = self.building.has_walls and shares.max() > BELIEVED
+        return int(shares.argmax()) if is_known else ANY_LEVEL, float(cloud.weight @ cloud.z_m)
+
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
         cloud = self.cloud
@@ -302,5 +308,5 @@ class MapFilter:
         return estimate_of(
             mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
             None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
-            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight),
+            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight), self._unmeasured.on_level,
         )  # fmt: skip
