@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from echostep.localization.unmeasured import FOLLOWED_S, PRIOR, UnmeasuredWay
-from echostep.particles.limits import BELIEVED, PROBABLE, SURE, WALKER_M_S
+from echostep.particles.limits import SURE, WALKER_M_S
 from echostep.path import MeasuredSegment, PathSegment
 
 PIECE_S = 0.5
 Heard = tuple[float, float]  # by the left and the right ranger; NaN: nothing
 WALLS: Heard = (1.2, 2.5)
 NOTHING: Heard = (math.nan, math.nan)
-NONE = np.zeros(0)
 
 
 def piece(k: int, heard: Heard, *, aloft: bool = False, step: int = 1, way_m: float = 0.0) -> MeasuredSegment:
@@ -90,44 +89,3 @@ def test_a_way_is_followed_for_two_seconds_and_then_left_to_a_search() -> None:
         way.weighed(piece(k, WALLS, step=k, way_m=1.2))
         away.append(way.away)
     assert max(away) > 0.4
-
-
-def off_level(height_m: Callable[[float], float], *, way_m: float = 0.0, s: float = 90.0) -> UnmeasuredWay:
-    """After heights by pressure (m, at a time), on one level: pieces of standing, or steps of this length."""
-    way, rng = UnmeasuredWay(), np.random.default_rng(8)
-    piece_s = PIECE_S if way_m == 0.0 else 1.0
-    for k in range(round(s / piece_s)):
-        segment = PathSegment(
-            k * piece_s, (k + 1) * piece_s, way_m, 0.0, 0.0, 0.0, 0.0, 0.0, k * (way_m > 0.0), rise_sd_m=0.05
-        )
-        t_s = np.arange(segment.t0_s, segment.t1_s, 0.11)
-        heights_m = np.array([height_m(t) for t in t_s.tolist()]) + 0.3 * rng.standard_normal(len(t_s))
-        way.weighed(MeasuredSegment(segment, NONE, np.zeros(0, np.int64), NONE, heights_m), 0)
-    return way
-
-
-def ramp(rise_m: float, begin_s: float, ramp_s: float) -> Callable[[float], float]:
-    return lambda t_s: rise_m * min(max((t_s - begin_s) / ramp_s, 0.0), 1.0)
-
-
-@pytest.mark.parametrize(("storey_m", "speed_m_s"), [(3.5, 0.2), (2.6, 1.0), (3.5, 1.0), (-3.5, 1.0), (14.0, 2.0)])
-def test_a_lift_that_the_plan_lacks_is_another_level(storey_m: float, speed_m_s: float) -> None:
-    ridden = off_level(ramp(storey_m, 5.0, abs(storey_m) / speed_m_s), s=300.0)
-    assert ridden.on_level < PROBABLE
-    there_and_back = lambda t: ramp(storey_m, 5.0, 9.0)(t) - ramp(storey_m, 100.0, 9.0)(t)  # noqa: E731
-    assert off_level(there_and_back, s=200.0).on_level > BELIEVED
-
-
-@pytest.mark.parametrize(
-    ("height_m", "way_m"),
-    [
-        (lambda t: 1e-3 * t, 0.0),  # a front, for an hour
-        (lambda t: 1e-3 * t, 1.2),
-        (lambda t: -0.45 * (t > 20.0), 0.0),  # a chair
-        (ramp(1.2, 20.0, 20.0), 1.2),  # a ramp
-        (lambda t: 1.0 * (20.0 < t < 23.0), 0.0),  # a gust of 12 Pa
-        *((lambda t, m=m: m * (20.0 < t < 60.0), way_m) for m in (-1.7, -2.9, -4.2) for way_m in (0.0, 1.2)),  # 20, 35, 50 Pa
-    ],
-)  # fmt: skip
-def test_weather_chairs_and_doors_are_no_other_level(height_m: Callable[[float], float], way_m: float) -> None:
-    assert off_level(height_m, way_m=way_m, s=3600.0 if height_m(3600.0) > 3.0 else 90.0).on_level > BELIEVED

@@ -114,7 +114,7 @@ class MapFilter:
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         # 1. The trunk may have moved though no step was measured.
-        measured = self._unmeasured.weighed(measured, *self._level())
+        measured = self._unmeasured.weighed(measured, self._level_m())
         segment, belief, away = measured.segment, self.belief, self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
@@ -279,11 +279,13 @@ class MapFilter:
         cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
         return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
 
-    def _level(self) -> tuple[int, float]:
-        """The level that is believed, if there are levels, and the mean height of the tracked cloud (m)."""
-        cloud, shares = self.cloud, self.cloud.level_shares
-        is_known = self.building.has_walls and shares.max() > BELIEVED
-        return int(shares.argmax()) if is_known else ANY_LEVEL, float(cloud.weight @ cloud.z_m)
+    def _level_m(self) -> float:
+        """Height of the tracked cloud in the plan (m) by the level that is believed, NaN: none is."""
+        cloud = self.belief.tracked.cloud
+        if cloud.sheet is None:
+            return 0.0 if self.building.has_walls else math.nan
+        is_known = isinstance(cloud, Cloud) and cloud.level_shares.max() > BELIEVED
+        return float(cloud.particles.weight @ cloud.particles.z_m) if is_known else math.nan
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""

@@ -15,7 +15,6 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.localization import Estimate, TrackStatus
-from echostep.particles.limits import HALF_STOREY_M
 from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
@@ -145,8 +144,7 @@ def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[tuple[float, Est
 def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth: Floats, from_s: float) -> DoubtRow:
     later = [(t, e) for t, e in shown if t >= from_s]
     true = at_times(np.array([e.t_s for _, e in later]), truth[:, T], truth[:, [X, Y, Z]])
-    dx, dy, dz = (np.array([(e.x_m, e.y_m, e.z_m) for _, e in later]) - true).T
-    off_m = np.where(np.abs(dz) < HALF_STOREY_M, np.hypot(dx, dy), np.hypot(dx, dy) + np.abs(dz))
+    off_m = np.linalg.norm(np.array([(e.x_m, e.y_m, e.z_m) for _, e in later]) - true, axis=1)
     sure = np.array([e.status is TrackStatus.TRACKING for _, e in later])
     false, span_s = sure & (off_m > FALSE_TRACKING_M), np.diff([from_s, *(t for t, _ in later)])
     longest = since = 0.0
