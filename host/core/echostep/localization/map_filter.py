@@ -118,9 +118,11 @@ class MapFilter:
         segment, belief, away = measured.segment, self.belief, self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
-        # 3. A way that was not observed scatters each hypothesis.
+        # 3. A way that was not observed scatters each hypothesis, straight through the building.
         if segment.unobserved:
-            self._scatter(segment, change)
+            for each in belief.clouds:
+                each.cloud.scatter(move_of(segment), change)
+            self._way.clear()
         # 4. After a stand, a pause, a long way that was not observed, the wearer may be elsewhere.
         belief.leave(away)
         if away >= UNOBSERVED_DOUBT:
@@ -207,12 +209,6 @@ class MapFilter:
         if self._height is not None:
             self._height.update(change)
         return change
-
-    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
-        """Spread the hypotheses over an unobserved segment, straight through the building."""
-        for each in self.belief.clouds:
-            each.cloud.scatter(move_of(segment), change)
-        self._way.clear()
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it. Returns the move and its pings."""
