@@ -84,8 +84,8 @@ def estimate_of(
     (m), if not the cloud's. `on_level`: probability that the plan has the trunk's level.
     """
     (cloud, right), *rivals = mixture
-    weight, probability = cloud.weight, np.array([each for _, each in mixture])  # of each cloud
-    shares = probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
+    weight, shares = cloud.weight, np.array([probability for _, probability in mixture])
+    shares = shares / shares.sum() if shares.any() else np.full(len(mixture), 1.0 / len(mixture))
     levels = tuple((on_level * shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
     z = float(weight @ cloud.z_m)
     height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
