@@ -84,8 +84,8 @@ class Publishing:
         """Offer a report of each estimate to the outboxes; never blocks. Without estimates, heartbeats before the first one."""
         alarm = reported_alarm(self._watch, self._tracker.front_end.newest_s)
         if not estimates:
-            last = self._last.alarm
-            if (alarm and (alarm.kind, alarm.number)) != (last and (last.kind, last.number)):
+            told = self._last.alarm
+            if (alarm and (alarm.kind, alarm.number)) != (told and (told.kind, told.number)):
                 self._offer(replace(self._last, alarm=alarm))  # with the last position
             self._offer_heartbeat(time.monotonic())
             return
