@@ -23,7 +23,10 @@ from echostep.foot.steps import Stance, Step
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 # The source of these limits is not recorded.
-HALVES = 7  # stances whose median duration counts
+HALVES, RUN_HALVES = (
+    7,
+    3,
+)  # stances whose median duration counts, walking and running; one alone may have been cut off by a gap
 STANDING_S = 0.8  # duration of a stance; longer ones are standing
 LONGEST_HALF_S = 0.35
 REACH_M = 0.4  # of a leg, ahead of the trunk: half a long step
@@ -62,7 +65,6 @@ class TrunkPath:
         self._toe = ToeAngle()
         self.steps = 0
         self._stood_s = math.inf  # last moment of a stance
-        self._mean_m_s = 0.0  # of the step before
         self.doubts: list[str] = []  # of the newest step
         self._scale_sd = KNOWN_SCALE_SD
 
@@ -80,7 +82,6 @@ class TrunkPath:
             if sample_index == len(t_s):
                 break
             self._rests_s.clear()
-            self._mean_m_s = 0.0
             segments.append((sample_index, self._standing_segment(float(until_s[sample_index]))))
         return segments
 
@@ -128,8 +129,8 @@ class TrunkPath:
         x, y = self._trunk_xy(heading)
         half_s = self._half_s()
         t0, x0, y0, heading0 = self._anchor or (landed_s + half_s - 1.0, x, y, heading)
-        mean_m_s = math.hypot(x - x0, y - y0) / max(landed_s + half_s - t0, RUN_STANCE_S)
-        m_s, self._mean_m_s = max(2.0 * mean_m_s - self._mean_m_s, mean_m_s), mean_m_s  # who speeds up does so evenly
+        gain = 2.0 if self._rests_s and self._rests_s[-1] > STANDING_S else 1.0  # who has stood speeds up evenly
+        m_s = gain * math.hypot(x - x0, y - y0) / max(landed_s + half_s - t0, RUN_STANCE_S)
         t_s = max(landed_s + min(half_s, REACH_M / max(m_s, REACH_M)), t0)
         self._anchor = (t_s, x, y, heading)
         anchor_sd_m = max(self._settings.anchor_sd_m, MIDDLE_SD_S * m_s)
@@ -156,8 +157,8 @@ class TrunkPath:
         return min(self._rests_s, default=math.inf) < RUN_STANCE_S
 
     def _half_s(self) -> float:
-        """Half the usual duration of a stance; of a run half a brief one."""
-        return 0.5 * min(self._rests_s) if self._runs else min(median(self._halves), LONGEST_HALF_S)
+        """Half the usual duration of a stance; of a run by its last ones."""
+        return min(median(list(self._halves)[-RUN_HALVES if self._runs else 0 :]), LONGEST_HALF_S)
 
 
 class ToeAngle:
