@@ -168,13 +168,9 @@ def test_what_is_too_far_or_too_faint_is_not_heard() -> None:
 # ---- the path ----
 
 
-def end_of(segments: tuple[object, ...]) -> Floats:
-    return np.array([[s.segment.dx_m, s.segment.dy_m] for s in segments]).sum(0)  # type: ignore[attr-defined]
-
-
 def test_exact_odometry_leads_along_the_poses(log_file: Path) -> None:
     walk = walk_from(building_of(log_file, 1), 0)
-    dx, dy = end_of(walk.segments)
+    dx, dy = np.sum([(s.segment.dx_m, s.segment.dy_m) for s in walk.segments], axis=0)
     c, s = math.cos(walk.true[0, 2]), math.sin(walk.true[0, 2])
     assert (c * dx - s * dy, s * dx + c * dy) == pytest.approx(tuple(walk.true[-1, :2] - walk.true[0, :2]), abs=0.02)
     assert len(walk.at_scan) == len(walk.true)

@@ -34,13 +34,9 @@ def sources(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def all_sources() -> list[Path]:
-    parts = ("firmware", "host", "protocol", "tests", "tools")
-    return [ROOT / "Makefile", ROOT / ".ci/run", *(path for part in parts for path in sources(ROOT / part))]
-
-
 def test_each_source_file_names_its_licence() -> None:
-    files = all_sources()
+    parts = ("firmware", "host", "protocol", "tests", "tools")
+    files = [ROOT / "Makefile", ROOT / ".ci/run", *(path for part in parts for path in sources(ROOT / part))]
     assert len(files) > 400
     for path in files:
         licence = "GPL-3.0-or-later" if path.is_relative_to(ROOT / "tools/twin") else "MIT"

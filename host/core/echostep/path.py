@@ -74,7 +74,7 @@ class PathSegment:
     """The trunk moves evenly by (dx, dy) in the walk frame, from `t0_s` to `t1_s`, turning from `heading0_rad` to `heading1_rad`, on a curve.
 
     `sd_m`: standard deviation of the move per axis. `turn_sd_rad`: growth of the yaw's standard deviation. `step`: steps so far.
-    `anchor_sd_m`: standard deviation of each end per axis, the same at both. `rise_m`: height gained by the foot, with its standard deviation,
+    `anchor_sd_m`: standard deviation of the end per axis, by itself. `rise_m`: height gained by the foot, with its standard deviation,
     infinite if no foot measured it. `scale_sd`: growth of the standard deviation of the scale that all lengths share. `belt`: of a foot's step.
     `running`: the foot rests too briefly for a walk. `aloft`: it has been off the floor for longer than a step takes.
     """

@@ -28,17 +28,13 @@ UNEVEN = np.array([0.0, 5.0, 8.5])
 METRE_PA = 11.8  # on the ground
 
 
-def pascals(height_m: Floats) -> Floats:
-    """Of a column of dry air at 20 degC on 101325 Pa."""
-    return np.asarray(101_325.0 * np.exp(-9.80665 * height_m / (287.053 * 293.15)))
-
-
 def record(
     height_m: Floats, rate_hz: float = 9.0, noise_pa: float = 3.0, extra_pa: NDArray[Any] | float = 0.0, seed: int = 1
 ) -> Pressures:
     rng = np.random.default_rng(seed)
     n = len(height_m)
-    return Pressures(np.arange(n) / rate_hz, pascals(height_m) + extra_pa + noise_pa * rng.standard_normal(n))
+    air_pa = 101_325.0 * np.exp(-9.80665 * height_m / (287.053 * 293.15))  # a column of dry air at 20 degC
+    return Pressures(np.arange(n) / rate_hz, air_pa + extra_pa + noise_pa * rng.standard_normal(n))
 
 
 def stairs_up(rate_hz: float = 9.0, speed: float = 0.3) -> Floats:

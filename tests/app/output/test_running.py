@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from echostep.foot.steps import Stance, Step, walk_track
-from echostep.foot.trunk_path import GaitSettings, TrunkPath
+from echostep.foot.trunk_path import MIDDLE_SD_S, GaitSettings, TrunkPath
 from echostep.localization import Estimate, TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
 from echostep.ports.chunks import MTX, Chunk, portion_of
@@ -58,6 +58,17 @@ def test_who_stands_runs_no_more() -> None:
     segments = path_of([0.3, 0.08, 3.0, 0.3])
     assert running_of(segments) == [False, True, False, False]
     assert not [segment for segment in segments if segment.dx_m < 0.1 and segment.t0_s > 2.0 and segment.running]
+
+
+def test_a_running_trunk_is_over_the_foot_in_the_middle_of_its_brief_rest() -> None:
+    """After a stand and after a walk, from the third step on: at 3 m/s a fifth of a second is 0.6 m."""
+    rests_s = [3.0, 0.06, 0.06, 0.4, 0.4, 0.4, 0.4, 0.06, 0.06, 0.06]
+    steps = [s for s in path_of(rests_s) if s.dx_m > 0.1]
+    middles_s = [0.5 * rest + sum(rests_s[:k]) + 0.5 * k for k, rest in enumerate(rests_s)][1:]
+    late_s = np.subtract([s.t1_s for s in steps[:-1]], middles_s)
+    assert abs(late_s[8]) < 0.01
+    assert max(late_s) < 0.2
+    assert steps[-1].anchor_sd_m == pytest.approx(MIDDLE_SD_S * 1.2 / 0.56, rel=0.1)
 
 
 @pytest.mark.slow

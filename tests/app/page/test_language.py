@@ -63,6 +63,7 @@ STATUSES = (
     "uncertain, 12 m above the start, 40 m",
     "lost: nothing from the foot for 120 s",
     "uncertain, 2 m, 3 % elsewhere",
+    "uncertain: the pressure says another floor",
     "lost: 7 places fit, 24 % in all; walk on, turn into a room or tap where you are",
     "this plan does not fit: is it another building or floor, or mirrored?",
 )

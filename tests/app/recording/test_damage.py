@@ -229,13 +229,9 @@ def test_exchanged_blocks_cost_what_is_in_them(tmp_path: Path) -> None:
     (a, a_end), (b, b_end) = ((begins[k], begins[k + 40]) for k in (300, 900))
     changed = whole[:a] + whole[b:b_end] + whole[a_end:b] + whole[a:a_end] + whole[b_end:]
     (tmp_path / "a.mcap").write_bytes(changed)
-    for found in (read(tmp_path / "a.mcap")[1], _repaired(tmp_path)):
-        assert found == CHUNKS[:300] + CHUNKS[340:900] + CHUNKS[940:]
-
-
-def _repaired(folder: Path) -> list[Chunk]:
-    repair(folder / "a.mcap", folder / "b.mcap")
-    return read(folder / "b.mcap")[1]
+    repair(tmp_path / "a.mcap", tmp_path / "b.mcap")
+    for name in ("a.mcap", "b.mcap"):
+        assert read(tmp_path / name)[1] == CHUNKS[:300] + CHUNKS[340:900] + CHUNKS[940:]
 
 
 def test_a_damaged_number_costs_no_message(tmp_path: Path) -> None:

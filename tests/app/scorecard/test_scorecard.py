@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from board_runs import ROOT
-from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
@@ -197,16 +195,13 @@ def test_evo_finds_the_same_trajectory_errors(tmp_path: Path) -> None:
     for ours, third in ((card.spherical, 1.0), (card.horizontal, 0.0)):
         plane = (1.0, 1.0, third)
         ape = APE(PoseRelation.translation_part)
-        ape.process_data(tuple(_poses(PoseTrajectory3D, xyz * plane, t_s[rows]) for xyz in (true[rows], found)))
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (int(rows.sum()), 1))
+        ape.process_data(tuple(PoseTrajectory3D(xyz * plane, upright, t_s[rows]) for xyz in (true[rows], found)))
         theirs = ape.get_all_statistics()
         assert ours is not None
         assert (ours.mean_m, ours.sd_m, ours.rms_m, ours.median_m, ours.min_m, ours.max_m) == pytest.approx(
             [theirs[key] for key in ("mean", "std", "rmse", "median", "min", "max")], abs=1e-12
         )
-
-
-def _poses(kind: Any, xyz_m: Floats, t_s: Floats) -> Any:
-    return kind(xyz_m, np.tile([1.0, 0.0, 0.0, 0.0], (len(t_s), 1)), t_s)
 
 
 def test_every_metric_states_its_unit_and_meaning() -> None:

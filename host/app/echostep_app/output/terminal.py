@@ -176,7 +176,7 @@ def describe(e: Estimate | None, plan: Plan) -> str:
         return "waiting for the foot to stand still"
     if not e.claims_place:
         places = f", {fitting(e.hypotheses)}" if e.hypotheses else ""
-        return f"{e.status.value}: place not known{places}   step {e.step}   t {e.t_s:.1f} s"
+        return f"{e.status.value}: place not known{places}{elsewhere(e)}   step {e.step}   t {e.t_s:.1f} s"
     return (
         f"{e.status.value}, {e.ellipse95.major_m:.2f} m{elsewhere(e)}   x {e.x_m:.2f} m  y {e.y_m:.2f} m  "
         f"heading {heading_words(plan, e.heading_rad, e.heading_sd_rad)}   step {e.step}   t {e.t_s:.1f} s"

@@ -128,7 +128,10 @@ class PageSession(GuardedSocket):
             self._told_end = self._frame_due = True
 
     async def _next_frame(self) -> bytes | None:
-        self._follow_goal()
+        # Any page may have changed the run's goal, or what is closed.
+        aim = goal, _ = self._mailbox.goal, self._mailbox.closed
+        if aim != self._aim:
+            self._destination, self._frame_due, self._aim = None if goal is None else Destination(goal), True, aim
         scene = self._scene()
         if scene is None or not (self._frame_due or self._is_new(scene)):
             return None
@@ -148,12 +151,6 @@ class PageSession(GuardedSocket):
         now = (scene, mailbox.marks, mailbox.orders, mailbox.team, mailbox.drawing_at(scene.t_s))
         playing = self._player is not None and self._player.playing
         return playing or any(new is not old for new, old in zip(now, had, strict=True))
-
-    def _follow_goal(self) -> None:
-        """Guide to the run's goal, past what is closed; any page may have changed them."""
-        aim = goal, _ = self._mailbox.goal, self._mailbox.closed
-        if aim != self._aim:
-            self._destination, self._frame_due, self._aim = None if goal is None else Destination(goal), True, aim
 
     def _frame(self, scene: PageScene) -> bytes:
         """A frame with what this page has not been sent yet; from then on it counts as sent."""

@@ -24,6 +24,7 @@ from echostep_app.printing.lines import as_error
 from echostep_app.scorecard.card import Scorecard
 from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.scorecard.truth import card_of
+from echostep_app.wearer.steady_status import elsewhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,10 +123,10 @@ def _print_summary(result: Result, plan: Plan, card: Scorecard | None) -> None:
     if result.losses:
         console.print(f"walk: {result.losses}", highlight=False)
     if not end.claims_place:
-        console.print("end: place not known")
+        console.print(f"end: place not known{elsewhere(end)}")
     elif words := Whereabouts(plan).words(end.x_m, end.y_m, end.level):
         floor = f", {plan.levels[end.level].name}" if len(plan.levels) > 1 else ""
-        console.print(f"end: {words}{floor}", markup=False, highlight=False)
+        console.print(f"end: {words}{floor}{elsewhere(end)}", markup=False, highlight=False)
     if result.elapsed_s:
         span_s = estimates[-1].t_s - estimates[0].t_s
         speed = span_s / result.elapsed_s

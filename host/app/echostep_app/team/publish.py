@@ -84,7 +84,9 @@ class Publishing:
         """Offer a report of each estimate to the outboxes; never blocks. Without estimates, heartbeats before the first one."""
         alarm = reported_alarm(self._watch, self._tracker.front_end.newest_s)
         if not estimates:
-            self._offer_alarm(alarm)
+            told = self._last.alarm
+            if (alarm and (alarm.kind, alarm.number)) != (told and (told.kind, told.number)):
+                self._offer(replace(self._last, alarm=alarm))  # with the last position
             self._offer_heartbeat(time.monotonic())
             return
         self._offered_s = math.inf
@@ -121,12 +123,6 @@ class Publishing:
         if kinds:
             return "It was sent; whether it has arrived is not known."
         return f"It has not gone out: {self.fault}." if self.fault else "It is being sent."
-
-    def _offer_alarm(self, alarm: ReportedAlarm | None) -> None:
-        """Without an estimate, a change of the alarm is reported with the last position."""
-        last = self._last.alarm
-        if (alarm and (alarm.kind, alarm.number)) != (last and (last.kind, last.number)):
-            self._offer(replace(self._last, alarm=alarm))
 
     def _recorded_at(self, t_s: float) -> str | None:
         """When an estimate was recorded; None in a live run, and where the recording has no time of day."""

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from echostep.localization import Estimate, LikelyPlace, TrackStatus
+from echostep.particles.limits import PROBABLE
 from echostep.path import PathSegment
 from echostep.tracker import Tracker
 
@@ -66,7 +67,14 @@ def fitting(places: Sequence[LikelyPlace]) -> str:
     return f"{count} {'place fits' if count == 1 else 'places fit'}, {100.0 * share:.0f} % in all"
 
 
+def other_floor(estimate: Estimate) -> str:
+    """That the wearer is on a floor that the plan lacks, or to which no way of the plan leads; else empty."""
+    return "the pressure says another floor" if sum(estimate.levels) < PROBABLE else ""
+
+
 def elsewhere(estimate: Estimate) -> str:
-    """The share of the belief that is not at the position's place, where the position is not sure."""
+    """Where a position that is not sure is wrong: another floor, or the share of the belief that is not at its place."""
+    if floor := other_floor(estimate):
+        return f", {floor}"
     share = round(100.0 * (1.0 - estimate.right))
     return f", {share} % elsewhere" if share and estimate.status is TrackStatus.UNCERTAIN else ""

@@ -24,9 +24,14 @@ from echostep.foot.zupt_ins import GAP_S
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 # The source of these limits is not recorded.
-HALVES = 7  # stances whose median duration counts
-STANCE_RANGE_S = (0.1, 0.8)  # duration of a stance in walking; longer ones are standing
-HALF_STANCE_RANGE_S = (0.1, 0.35)
+HALVES, RUN_HALVES = (
+    7,
+    3,
+)  # stances whose median duration counts, walking and running; one alone may have been cut off by a gap
+STANDING_S = 0.8  # duration of a stance; longer ones are standing
+LONGEST_HALF_S = 0.35
+REACH_M = 0.4  # of a leg, ahead of the trunk: half a long step
+MIDDLE_SD_S = 0.03  # assumed, of the time at which the trunk is over the foot: in a walk `GaitSettings.anchor_sd_m`
 RUN_STANCE_S = 0.12  # assumed; a walking foot is still for 0.2 to 0.5 s, a running one for 0.04 to 0.1 s
 RUN_MEMORY = 2  # stances of which the briefest decides whether the foot runs: a turn within a run takes longer, assumed
 STRAIGHT_STEP_M = 0.6  # least length of a step that shows the direction of travel
@@ -105,7 +110,7 @@ class TrunkPath:
         until_s = stance.t_end_s - self._half_s()
         if self._anchor is not None and until_s > self._anchor[0]:
             segments.append(self._standing_segment(until_s))
-        if STANCE_RANGE_S[0] < duration_s < STANCE_RANGE_S[1]:
+        if duration_s < STANDING_S:
             self._halves.append(0.5 * duration_s)
         return segments
 
@@ -118,25 +123,26 @@ class TrunkPath:
         self._foot_xy = (self._foot_xy[0] + dx, self._foot_xy[1] + dy)
         heading = step.heading_rad + self._toe.angle_rad
         variance = 0.5 * (float(step.covariance[0][0]) + float(step.covariance[1][1]))
-        segment = self._moving_segment(
-            step.t_end_s + self._half_s(), heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad
-        )
+        segment = self._moving_segment(step.t_end_s, heading, math.sqrt(max(variance, 0.0)), step.heading_sd_rad)
         rise_sd = math.sqrt(max(float(step.covariance[2][2]), 0.0))
         aloft = step.t_end_s - max(step.t_start_s, self._stood_s) > ALOFT_S  # its length, and so the scale, says little
         before, self._scale_sd = self._scale_sd, max(self._scale_sd, 0.0 if aloft else step.scale_sd)
         growth = math.sqrt(self._scale_sd**2 - before**2)
         return [replace(segment, rise_m=float(step.move_m[2]), rise_sd_m=rise_sd, scale_sd=growth, aloft=aloft)]
 
-    def _moving_segment(self, t_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
+    def _moving_segment(self, landed_s: float, heading: float, sd_m: float, turn_sd_rad: float) -> PathSegment:
         """The segment from the last anchor to a new one over the foot; without a last anchor, an empty segment of one second."""
         x, y = self._trunk_xy(heading)
-        t0, x0, y0, heading0 = self._anchor or (t_s - 1.0, x, y, heading)
-        t_s = max(t_s, t0)
+        half_s = self._half_s()
+        t0, x0, y0, heading0 = self._anchor or (landed_s + half_s - 1.0, x, y, heading)
+        gain = 2.0 if self._rests_s and self._rests_s[-1] > STANDING_S else 1.0  # who has stood speeds up evenly
+        m_s = gain * math.hypot(x - x0, y - y0) / max(landed_s + half_s - t0, RUN_STANCE_S)
+        t_s = max(landed_s + min(half_s, REACH_M / max(m_s, REACH_M)), t0)
         self._anchor = (t_s, x, y, heading)
+        anchor_sd_m = max(self._settings.anchor_sd_m, MIDDLE_SD_S * m_s)
         return PathSegment(
-            t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, self._settings.anchor_sd_m,
-            running=self._runs,
-        )  # fmt: skip
+            t0, t_s, x - x0, y - y0, heading0, heading, sd_m, turn_sd_rad, self.steps, anchor_sd_m, running=self._runs
+        )
 
     def _standing_segment(self, t_s: float) -> PathSegment:
         """The segment from the last anchor to the same position at `t_s`, the new anchor."""
@@ -157,8 +163,8 @@ class TrunkPath:
         return min(self._rests_s, default=math.inf) < RUN_STANCE_S
 
     def _half_s(self) -> float:
-        """Half the usual duration of a stance."""
-        return min(max(median(self._halves), HALF_STANCE_RANGE_S[0]), HALF_STANCE_RANGE_S[1])
+        """Half the usual duration of a stance; of a run by its last ones."""
+        return min(median(list(self._halves)[-RUN_HALVES if self._runs else 0 :]), LONGEST_HALF_S)
 
 
 class ToeAngle:

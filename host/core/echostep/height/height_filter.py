@@ -17,6 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.height.levels import HeightChange
+from echostep.particles.limits import HALF_STOREY_M
 
 # Spectral density of the acceleration: 0.8 m/s2 for 1.25 s at either end of a ride [ISO 8100-32, typical]
 STARTING_M2_S3 = 0.2
@@ -27,6 +28,9 @@ CLIMB_M_S = 0.5  # standard deviation of a climb that no foot measured, in a sec
 UNKNOWN_M = 1e4  # standard deviation of the lag before the first pressure: any place on earth
 # Assumed, not measured: how long a rise is kept in mind (weather, the foot's drift); sd of its difference by foot and pressure (draughts, noise)
 KEPT_S, ALIKE_M = 10.0, 0.25
+# The same of the height by pressure against a level (draughts, doors: 6 Pa); longest way of a trunk that may ride; speeds on stairs and of lifts: a
+# faster change is the door of a stairwell under pressure, 20 to 50 Pa [EN 12101-6]
+OFF_KEPT_S, OFF_SD_M, RESTING_M, CLIMBING_M_S, RIDING_M_S = 60.0, 0.5, 0.2, 0.5, 2.5
 
 
 class RidingHeight:
@@ -105,21 +109,33 @@ class RelativeHeight:
             self._covariance = 0.5 * (self._covariance + self._covariance.T)
 
 
-class LiftedFoot:
-    """`evidence`: half the squared, normalized height of the foot above the floor: a foot that is lifted rises, the pressure at the belt stays."""
+class Rises:
+    """Of a lifted foot, beside a belt whose pressure stays; of the pressure in a lift that the plan lacks, beside a level that stays.
+
+    `evidence`: half the squared, normalized height of the foot above the floor. `off_m`: how far the height by pressure has left the level; from half
+    a storey on it is kept, whatever the weather.
+    """
 
     def __init__(self) -> None:
-        self.evidence = self._felt_m = self._risen_m = 0.0
-        self._height_m, self._starts = math.nan, 0
+        self.evidence = self.off_m = self._felt_m = self._risen_m = 0.0
+        self._height_m, self._starts, self._level_m = math.nan, 0, math.nan
 
-    def update(self, change: HeightChange, barometer_starts: int) -> float:
-        """Of a segment; `barometer_starts`: how often the heights by pressure have begun. Returns by how much the evidence has grown."""
+    def update(self, change: HeightChange, way_m: float, barometer_starts: int, level_m: float) -> float:
+        """Of a segment with a way of this length; `barometer_starts`: how often the heights by pressure have begun; `level_m`: height of the trunk by
+        its level, NaN: none is believed. Returns by how much the evidence has grown.
+        """
         if math.isinf(change.height_sd_m):
             return 0.0
         begins = barometer_starts != self._starts or math.isnan(self._height_m)
         risen_m, fade = (0.0, 0.0) if begins else (change.height_m - self._height_m, math.exp(-change.span_s / KEPT_S))
         self._felt_m, self._risen_m = fade * (self._felt_m + change.felt_m), fade * (self._risen_m + risen_m)
         self._height_m, self._starts, was = change.height_m, barometer_starts, self.evidence
+        climbed_m, self._level_m = level_m - self._level_m, level_m
+        if not abs(climbed_m) < HALF_STOREY_M:  # another level is believed, or none
+            self.off_m = 0.0
+        elif abs(risen_m) < (RIDING_M_S if way_m < RESTING_M else CLIMBING_M_S) * change.span_s:
+            kept = 1.0 if abs(self.off_m) > HALF_STOREY_M else math.exp(-change.span_s / OFF_KEPT_S)
+            self.off_m = kept * self.off_m + risen_m - climbed_m
         now = 0.5 * (max(self._felt_m - max(self._risen_m, 0.0), 0.0) / ALIKE_M) ** 2
         self.evidence = max(now, was) if now > 0.5 else now
         return max(self.evidence - was, 0.0)

@@ -146,17 +146,13 @@ class Heading:
         if is_missing:
             self.P[HEADING, HEADING] += MISSING_WALK_RAD**2 * dt
         elif not self._has_rate:
-            self._start_gyro()
+            self._has_rate = True
+            if self.known and not self._given:  # by the compass: known as by a first reading
+                self.P[HEADING] = self.P[:, HEADING] = 0.0
+                self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
         self._since_s += dt
         if self._since_s >= STEP_S:
             self._propagate_covariance()
-
-    def _start_gyro(self) -> None:
-        """First rate of the gyro: the heading known so far is the compass's, so it gets the standard deviation of a first reading."""
-        self._has_rate = True
-        if self.known and not self._given:
-            self.P[HEADING] = self.P[:, HEADING] = 0.0
-            self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
 
     def _propagate_covariance(self) -> None:
         """Propagate the covariance over the time since the last propagation."""
@@ -179,15 +175,12 @@ class Heading:
             return
         self._bins.append(total / count)
         if len(self._bins) == CALM_BINS and max(self._bins) - min(self._bins) < CALM_RAD_S:
-            self._zero_rate_update(self._bins[CALM_BINS // 2])
-
-    def _zero_rate_update(self, rate: float) -> None:
-        """A trunk at rest does not turn: its rate is a measurement of the bias."""
-        innovation = rate - float(self.state[BIAS])
-        if abs(innovation) < GATE_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
-            row = np.zeros(SIZE)
-            row[BIAS] = 1.0
-            self._update(row, innovation, self.settings.rest_sd_rad_s**2)
+            # A trunk at rest does not turn: its rate is a measurement of the bias
+            innovation = self._bins[CALM_BINS // 2] - float(self.state[BIAS])
+            if abs(innovation) < GATE_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
+                row = np.zeros(SIZE)
+                row[BIAS] = 1.0
+                self._update(row, innovation, self.settings.rest_sd_rad_s**2)
 
     def _compass_update(self, t_s: float, compass: float) -> None:
         """One reading of the compass: the first one, also after a gap, sets an unknown heading; a later one must be steady and within the gate."""
@@ -203,18 +196,15 @@ class Heading:
             return
         waves = harmonics(heading)
         innovation = wrap(compass - heading - float(self.state[IRON:] @ waves))
-        if not self._steady(t_s, compass) or abs(innovation) > self._gate():
+        iron = float(np.trace(self.P[IRON:, IRON:]))
+        gate = GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
+        if not self._steady(t_s, compass) or abs(innovation) > gate:
             self.refused += 1
             return
         row = np.zeros(SIZE)
         row[HEADING], row[IRON:] = 1.0, waves
         alike = max(1.0, self.settings.same_s / self._period_s)  # readings with the same disturbance
         self._update(row, innovation, alike * self.settings.disturbance_rad**2)
-
-    def _gate(self) -> float:
-        """Largest innovation (rad) of the compass."""
-        iron = float(np.trace(self.P[IRON:, IRON:]))
-        return GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
 
     def _steady(self, t_s: float, compass: float) -> bool:
         """Whether compass and gyro turned alike within about the last second."""

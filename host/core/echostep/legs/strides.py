@@ -277,7 +277,9 @@ class StrideEstimator:
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         self._bout.strike = strike
         self._bout.toe_off = self._bout.peaks[-2] + leg_swings.toe_off_index(rate, len(rate) - 1, strike)
-        self._bout.add_lead(leg_swings.thigh_lead(np.column_stack([np.diff(thigh), np.diff(shank)])))
+        # The direction does not change from stride to stride, but a stride that ends a walk has hardly any lead
+        lead, before = leg_swings.thigh_lead(np.column_stack([np.diff(thigh), np.diff(shank)])), self._bout.lead
+        self._bout.lead = lead if np.isnan(before) else 0.5 * (lead + before)
         if self._bout.lead < leg_swings.BACKWARD_LEAD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
         if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:

@@ -72,6 +72,7 @@ Mixture = Sequence[tuple[Particles, float]]
 def estimate_of(
     mixture: Mixture, t_s: float, walk_heading_rad: float, step: int, sd_m: float = 0.0, map_sd_m: float = 0.0,
     elsewhere: Moments | None = None, height: tuple[float, float] | None = None, plan_fits: float = 1.0, outside: float = 0.0,
+    on_level: float = 1.0,
 ) -> Estimate:  # fmt: skip
     """Weighted moments of the tracked cloud [Girard 2011, eq. 2 for the mean], and how likely small errors are by all clouds.
 
@@ -80,11 +81,12 @@ def estimate_of(
     The 95 % ellipse of the covariance is the region of 95 % of the belief, as long as one place has more; below that, the covariance is that of the
     mixture with `elsewhere`, where the trunk is if all clouds are wrong, about the position. `sd_m`: standard deviation per axis to add. `map_sd_m`:
     of the map itself there, as a drawing states it; it is part of `sd_m`, and makes small errors less likely. `height`: mean and standard deviation
-    (m), if not the cloud's.
+    (m), if not the cloud's. `on_level`: probability that the plan has the trunk's level.
     """
     (cloud, right), *rivals = mixture
-    weight, shares = cloud.weight, _shares(mixture)
-    levels = tuple((shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
+    weight, shares = cloud.weight, np.array([probability for _, probability in mixture])
+    shares = shares / shares.sum() if shares.any() else np.full(len(mixture), 1.0 / len(mixture))
+    levels = tuple((on_level * shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
     z = float(weight @ cloud.z_m)
     height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
     m = region = moments(cloud, weight, walk_heading_rad)
@@ -117,12 +119,6 @@ def estimate_of(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, *height,
         protection_m, right, places, plan_fits, outside,
     )  # fmt: skip
-
-
-def _shares(mixture: Mixture) -> Floats:
-    """Probability (n,) of each cloud, if the trunk is in one of them."""
-    probability = np.array([probability for _, probability in mixture])
-    return probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
 
 
 def _places(mixture: Mixture, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:

@@ -39,9 +39,9 @@ class TrackStatus(StrEnum):
 class Estimate:
     """Trunk position in the map (m), covariance (xx, xy, yy in m2), heading (rad), at `t_s`.
 
-    `level` is the likeliest one (an index into the plan's), `levels` the probability of each, `z_m` the height in the plan's metres.
-    `protection_m`: radius on that level beyond which the error is with probability RISK, infinite if none is that safe. `right`: probability of
-    the position's place; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
+    `level` is the likeliest one (an index into the plan's), `levels` the probability of each: the rest is a floor that the plan lacks. `z_m` is the
+    height in the plan's metres. `protection_m`: radius on that level beyond which the error is with probability RISK, infinite if none is that safe.
+    `right`: probability of the position's place; `plan_fits`: that the plan is the building's; `outside`: that the trunk is outside of the building.
     `hypotheses`: the likely places where none is alone, the likeliest first, each with its share of the belief.
 
     >>> import echostep

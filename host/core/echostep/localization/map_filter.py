@@ -114,13 +114,15 @@ class MapFilter:
     def update(self, measured: MeasuredSegment) -> Estimate:
         """Propagate along a segment, reweight by its pings and height change, and resample; returns the estimate at its end."""
         # 1. The trunk may have moved though no step was measured.
-        measured = self._unmeasured.weighed(measured)
+        measured = self._unmeasured.weighed(measured, self._level_m())
         segment, belief, away = measured.segment, self.belief, self._unmeasured.away
         # 2. How the height has changed, by the foot and by pressure.
         change = self._height_change(measured)
-        # 3. A way that was not observed scatters each hypothesis.
+        # 3. A way that was not observed scatters each hypothesis, straight through the building.
         if segment.unobserved:
-            self._scatter(segment, change)
+            for each in belief.clouds:
+                each.cloud.scatter(move_of(segment), change)
+            self._way.clear()
         # 4. After a stand, a pause, a long way that was not observed, the wearer may be elsewhere.
         belief.leave(away)
         if away >= UNOBSERVED_DOUBT:
@@ -208,12 +210,6 @@ class MapFilter:
             self._height.update(change)
         return change
 
-    def _scatter(self, segment: PathSegment, change: HeightChange) -> None:
-        """Spread the hypotheses over an unobserved segment, straight through the building."""
-        for each in self.belief.clouds:
-            each.cloud.scatter(move_of(segment), change)
-        self._way.clear()
-
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it. Returns the move and its pings."""
         segment, belief, walls = measured.segment, self.belief, self.building.walls
@@ -279,6 +275,14 @@ class MapFilter:
         cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
         return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
 
+    def _level_m(self) -> float:
+        """Height of the tracked cloud in the plan (m) by the level that is believed, NaN: none is."""
+        cloud = self.belief.tracked.cloud
+        if cloud.sheet is None:
+            return 0.0 if self.building.has_walls else math.nan
+        is_known = isinstance(cloud, Cloud) and cloud.level_shares.max() > BELIEVED
+        return float(cloud.particles.weight @ cloud.particles.z_m) if is_known else math.nan
+
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
         cloud = self.cloud
@@ -302,5 +306,5 @@ class MapFilter:
         return estimate_of(
             mixture, segment.t1_s, segment.heading1_rad, segment.step, sd_m, map_sd_m, self.building.elsewhere,
             None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
-            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight),
+            self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight), self._unmeasured.on_level,
         )  # fmt: skip

@@ -13,14 +13,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from echostep.height.height_filter import LiftedFoot
+from echostep.height.height_filter import OFF_SD_M, Rises
 from echostep.localization.motion import height_change
 from echostep.particles.limits import PROBABLE, WALKER_M_S
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
 
 # Assumed, not measured. Rates (1/s) at which such a way begins: with a witness; in a silence that the stand began with; where rangers fell silent
 BEGINS_PER_S, SILENT_PER_S, UNSEEN_PER_S = 1e-4, 0.005, 0.03
-PRIOR = 1e-4  # that it begins with the stand
+PRIOR, MOST_SD = 1e-4, 10.0  # that it begins with the stand; standard deviations beyond which nothing is surer
 FOLLOWED_S = 2.0  # of such a way that a cloud follows; after a longer one the building is searched
 # Between two segments: nothing was received; of an unobserved segment: a walk out of the room
 PAUSE_S, LONG_S = 1.0, 5.0
@@ -48,18 +48,27 @@ class UnmeasuredWay:
         self._heard_s, self._is_aloft, self._step = math.inf, False, 0  # when a ranger last heard something: never
         self._begin_s = self._spread_s = math.inf  # of the stand; up to which the trunk has been spread
         self._look_anew(math.inf)
-        self._lifted = LiftedFoot()
+        self._rises = Rises()
 
     @property
     def has_moved(self) -> bool:
         """Whether the trunk has probably moved since the last measured step."""
         return self.probability > PROBABLE
 
-    def weighed(self, measured: MeasuredSegment) -> MeasuredSegment:
-        """Update the probability; the segment, or one that was not observed where the trunk has probably moved."""
+    @property
+    def on_level(self) -> float:
+        """Probability that the trunk is on its level, by the pressure: no lift that the plan lacks has moved it."""
+        off = min(abs(self._rises.off_m) / OFF_SD_M, MOST_SD)
+        return 1.0 / (1.0 + PRIOR * math.expm1(0.5 * off**2))
+
+    def weighed(self, measured: MeasuredSegment, level_m: float = math.nan) -> MeasuredSegment:
+        """Update the probabilities; the segment, or one that was not observed where the trunk has probably moved.
+
+        `level_m`: the trunk's height in the plan by the level that is believed, NaN: none is.
+        """
         segment, before = measured.segment, self.probability
         is_step, self._step = segment.step != self._step or segment.unobserved, segment.step
-        odds = math.exp(self._log_ratio(measured, is_step=is_step)) * self._begun(measured)
+        odds = math.exp(self._log_ratio(measured, level_m, is_step=is_step)) * self._begun(measured)
         self.probability = min(max(odds / (1.0 + odds), PRIOR), 1.0 - PRIOR)
         self.pause_s, self._end_s = max(segment.t0_s - self._end_s, 0.0), segment.t1_s
         is_gap = self.pause_s > PAUSE_S or (segment.unobserved and segment.t1_s - segment.t0_s > LONG_S)
@@ -78,16 +87,17 @@ class UnmeasuredWay:
         stood = max((1.0 - self.probability) * math.exp(-per_s * (segment.t1_s - segment.t0_s)), PRIOR)
         return (1.0 - stood) / stood
 
-    def _log_ratio(self, measured: MeasuredSegment, *, is_step: bool) -> float:
+    def _log_ratio(self, measured: MeasuredSegment, level_m: float, *, is_step: bool) -> float:
         """Log-likelihood ratio of a segment: by the foot, or if it stands, by the rangers."""
         segment, was_aloft, self._is_aloft = measured.segment, self._is_aloft, measured.segment.aloft and not is_step
         way = math.hypot(segment.dx_m / STEP_M, segment.dy_m / STEP_M, segment.turn_rad / STEP_RAD)
         if is_step and way > SHUFFLE:
             self._look_anew(segment.t1_s)
-        ratio = self._lifted.update(height_change(measured, math.nan), measured.barometer_starts)
+        change, way_m = height_change(measured, math.nan), math.hypot(segment.dx_m, segment.dy_m)
+        ratio = self._rises.update(change, way_m, measured.barometer_starts, level_m)
         ratio += ALOFT if segment.aloft and not was_aloft else 0.0
         if is_step and not segment.aloft:
-            ratio += STEPPED * (1.0 if segment.unobserved else min(way, 1.0) ** 2) * math.exp(-self._lifted.evidence)
+            ratio += STEPPED * (1.0 if segment.unobserved else min(way, 1.0) ** 2) * math.exp(-self._rises.evidence)
         return ratio + sum(
             map(self._compared, measured.ranger.tolist(), measured.range_m.tolist(), measured.t_s.tolist())
         )

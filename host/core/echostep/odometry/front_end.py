@@ -281,7 +281,7 @@ class FrontEnd:
     def _merge_paths(
         self, foot_segments: list[tuple[int, list[PathSegment]]], leg_blocks: list[tuple[int, GyroBlock]], times: Times, stands: Bools
     ) -> Floats:  # fmt: skip
-        """Merge foot and legs into one path, message by message, and hand its segments to the synchronizer.
+        """Merge foot and legs into one path, message by message, and hand its segments to the synchronizer; the foot's to the watch, too.
 
         Returns, for each message (n,), the time up to which foot or legs have been observed.
         """
@@ -292,7 +292,9 @@ class FrontEnd:
                 foot_segments[next_segment][0] < message_index or block is None
             ):
                 foot_index, segments = foot_segments[next_segment]
-                self._pass_on(foot_index, self.handover.add_foot_segments(segments))
+                segments = self.handover.add_foot_segments(segments)
+                self._synchronizer.add_segments(foot_index, segments)
+                self.watch.add_segments(foot_index, segments)
                 next_segment += 1
             if block is not None:
                 segments = self.handover.add_leg_block(
@@ -305,11 +307,6 @@ class FrontEnd:
         lengths = np.diff(block_index)
         foot_s = np.where(np.repeat(worn[:-1], lengths), times.mtx_newest_s, -np.inf)
         return np.fmax(foot_s, np.repeat(legs_s[:-1], lengths))
-
-    def _pass_on(self, message_index: int, segments: list[PathSegment]) -> None:
-        """Hand segments of the one path to the synchronizer and to the watch of the wearer."""
-        self._synchronizer.add_segments(message_index, segments)
-        self.watch.add_segments(message_index, segments)
 
 
 def _board_arrivals(frames: Frames, chunk_row: Ints, t_arrival_ns: Ints) -> Arrivals:

@@ -111,7 +111,10 @@ class HeadingFusion:
         dt = headings.t_s - last.t_s
         belt = known.belt_variance(dt, wrap(headings.foot_rad - last.foot_rad))
         share = headings.growth_rad2 / (headings.growth_rad2 + belt)
-        self._fade(known, headings.growth_rad2, dt)
+        if known.trusted and headings.growth_rad2 > 0.0:
+            # Back to the foot over the time in which the error of the belt's bias makes as much drift as the foot has
+            over_s = max(headings.growth_rad2 / (dt * float(known.P[BIAS, BIAS])), CORRELATED_S)
+            self.correction_rad *= math.exp(-dt / over_s)
         known.propagate(headings, math.exp(-dt / RECENT_S))
         if not known.update(headings):
             self._refused += 1
@@ -122,12 +125,6 @@ class HeadingFusion:
         self.correction_rad = wrap(self.correction_rad + self._share * error_rad)
         self._refused, self._promised = 0, 0.0
         return True
-
-    def _fade(self, known: HeadingFilter, growth_rad2: float, dt: float) -> None:
-        """Return to the foot over the time (s) in which the error of the belt's bias makes as much drift as the foot has."""
-        if known.trusted and growth_rad2 > 0.0:
-            over_s = max(growth_rad2 / (dt * float(known.P[BIAS, BIAS])), CORRELATED_S)
-            self.correction_rad *= math.exp(-dt / over_s)
 
     def _keep_foot(self) -> None:
         """The foot's turn stays uncorrected: the next step states the variance that was left out."""

@@ -247,7 +247,12 @@ class Tracker:
     def _filter_from(self, measured: MeasuredSegment) -> AidedFilter | None:
         """The filter that a segment moves; None while neither a start nor a check-in is known."""
         self._ranger_part = measured.ranger_part or self._ranger_part
-        self.filter = self.filter or self._first_filter(measured.segment.heading0_rad)
+        if self.filter is None:
+            heading_rad = measured.segment.heading0_rad
+            if self._check_in is not None:
+                self.filter = self._filter_at(self._check_in, heading_rad)
+            elif self.start is not None:
+                self.filter = self._new_filter(self.start, heading_rad, self._rng)
         return self.filter
 
     def _step(
@@ -351,12 +356,6 @@ class Tracker:
         if self._segment is None or self._estimate is None:
             return []
         return [self._publish(MeasuredSegment(self._segment, *NO_PINGS), self._estimate)]
-
-    def _first_filter(self, walk_heading_rad: float) -> AidedFilter | None:
-        """The filter at the first segment; None while neither a start nor a check-in is known."""
-        if self._check_in is not None:
-            return self._filter_at(self._check_in, walk_heading_rad)
-        return None if self.start is None else self._new_filter(self.start, walk_heading_rad, self._rng)
 
     def _filter_at(self, check_in: CheckIn, walk_heading_rad: float) -> AidedFilter:
         """A filter about a check-in; a check-in without a heading takes the last estimate's heading if it is known, else any."""

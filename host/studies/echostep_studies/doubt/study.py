@@ -24,7 +24,7 @@ from echostep_simulation.people.walker import Walk, Waypoint
 from echostep_simulation.scenario import START_NS, Scenario
 from echostep_studies.bench.judgement import FALSE_TRACKING_M
 from echostep_studies.bench.sites import office
-from echostep_studies.bench.walks import T, X, Y
+from echostep_studies.bench.walks import T, X, Y, Z
 from echostep_studies.doubt import faults, wearers
 from echostep_studies.doubt.wearers import Span
 from echostep_studies.frame.parts import matching
@@ -70,6 +70,7 @@ KINDS = {
     "carried/covered": Kind(wearers.carried, faults.covered),
     "trolley": Kind(wearers.on_trolley),
     "trolley/covered": Kind(wearers.on_trolley, faults.covered),
+    "lift": Kind(wearers.lifted, stands=True),
     "rangers/die": Kind(hears=faults.one_after_the_other),
     "rangers/covered": Kind(hears=faults.covered),
     "plug": Kind(arrives=faults.loose_plug),
@@ -142,8 +143,8 @@ def _tracked(tracker: Tracker, chunks: Sequence[Chunk]) -> list[tuple[float, Est
 
 def _judged(name: str, seed: int, shown: Sequence[tuple[float, Estimate]], truth: Floats, from_s: float) -> DoubtRow:
     later = [(t, e) for t, e in shown if t >= from_s]
-    true = at_times(np.array([e.t_s for _, e in later]), truth[:, T], truth[:, [X, Y]])
-    off_m = np.hypot(*(np.array([(e.x_m, e.y_m) for _, e in later]) - true).T)
+    true = at_times(np.array([e.t_s for _, e in later]), truth[:, T], truth[:, [X, Y, Z]])
+    off_m = np.linalg.norm(np.array([(e.x_m, e.y_m, e.z_m) for _, e in later]) - true, axis=1)
     sure = np.array([e.status is TrackStatus.TRACKING for _, e in later])
     false, span_s = sure & (off_m > FALSE_TRACKING_M), np.diff([from_s, *(t for t, _ in later)])
     longest = since = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What may befall a wearer: the foot's sensor falls off, he is carried, he stands on a trolley, he only stands.
+"""What may befall a wearer: the foot's sensor falls off, he is carried, he stands on a trolley or in a lift, he only stands.
 
 In: a simulated `Walk`, a time span. Out: the same walk with another foot and other legs; the trunk, and so belt and echoes, stay. Owns nothing.
 """
@@ -12,7 +12,9 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep_simulation.people.attitude import rotations
+from echostep_simulation.people.rolling_foot import glide
 from echostep_simulation.people.walker import Walk
+from echostep_simulation.world.tower import STOREY_M
 
 Span = tuple[float, float]  # s
 BLEND_S = 1.0  # from standing to being carried, and back
@@ -20,6 +22,7 @@ BLEND_S = 1.0  # from standing to being carried, and back
 HELD = np.array([0.4, -0.1, 0.9])
 TILT_RAD = np.radians(70.0)
 BOB_M, BOB_HZ = 0.02, 1.8
+RIDE_S = 6.0  # a storey at 1.1 m/s at most
 
 
 def fallen_off(walk: Walk, span_s: Span) -> Walk:
@@ -51,6 +54,14 @@ def on_trolley(walk: Walk, span_s: Span) -> Walk:
         [np.zeros((len(walk.t_s), 2)), walk.heading_rad + walk.foot_rpy_rad[at, 2] - walk.heading_rad[at]]
     )
     return _moved(walk, span_s, offset, rpy, np.zeros_like(walk.t_s))
+
+
+def lifted(walk: Walk, span_s: Span) -> Walk:
+    """A lift that the plan lacks takes the wearer up to an equal floor."""
+    rise_m = STOREY_M * glide(walk.t_s - span_s[0], 0.0, RIDE_S)
+    return replace(
+        walk, height_m=walk.height_m + rise_m, foot_m=walk.foot_m + rise_m[:, None] * np.array([0.0, 0.0, 1.0])
+    )
 
 
 def _moved(walk: Walk, span_s: Span, offset: Floats, rpy: Floats, bob: Floats) -> Walk:

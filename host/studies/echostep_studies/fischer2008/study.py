@@ -95,13 +95,8 @@ def cases() -> Iterator[Case]:
                 if parameter == "period_s":
                     yield Case(label, system, period_s=value, every=SAMPLE)
                 else:
-                    yield Case(label, system, _with(parameter, value), every=SAMPLE)
-
-
-def _with(parameter: str, value: float) -> GroundSettings:
-    """The nominal ground with one parameter changed."""
-    changed: dict[str, Any] = {parameter: value}
-    return replace(NOMINAL, **changed)
+                    changed: dict[str, Any] = {parameter: value}
+                    yield Case(label, system, replace(NOMINAL, **changed), every=SAMPLE)
 
 
 def fischer2008_study(runs: int, seed: int) -> Study[BatchRun, Row]:

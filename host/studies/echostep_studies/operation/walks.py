@@ -80,15 +80,9 @@ def waypoints(plan: Plan, seed: int, half_m: float) -> tuple[list[Waypoint], int
     """Two tours with a stop in between, and the number of that stop."""
     rng = np.random.default_rng([seed, 80])
     first = random_tour(plan, LOBBY, half_m, rng, anywhere=True)
-    x, y, _, z = _full(first[-1])
+    x, y, _, z = (*first[-1], 0.0, 0.0)[:4]
     second = random_tour(plan, RoutePlace(x, y, round(z / STOREY_M)), half_m, rng)
     return [*first[:-1], (x, y, CHANGE_S + 4.0, z), *second[1:]], len(first) - 1
-
-
-def _full(waypoint: Waypoint) -> tuple[float, float, float, float]:
-    """A waypoint with pause and height."""
-    x, y, pause_s, height_m = (*waypoint, 0.0, 0.0)[:4]
-    return x, y, pause_s, height_m
 
 
 def _standing_s(truth: Floats, stop: Waypoint) -> float:

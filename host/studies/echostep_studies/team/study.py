@@ -56,17 +56,9 @@ COLUMNS = {
     "others_together_m": "together", "worst": "worst", "by_chance": "by chance", "false_alone": "false tracking %", "false_together": "together",
 }  # fmt: skip
 Building = tuple[Plan, RoutePlace]
-
-
-def _office() -> Building:
-    return load_plan(sites.OFFICE_PLAN), sites.OFFICE_DOOR
-
-
-def _tower() -> Building:
-    return tower(sites.STOREYS), sites.LOBBY
-
-
-BUILDINGS: dict[str, Callable[[], Building]] = {"office": _office, "tower": _tower}
+BUILDINGS: dict[str, Callable[[], Building]] = {
+    "office": lambda: (load_plan(sites.OFFICE_PLAN), sites.OFFICE_DOOR), "tower": lambda: (tower(sites.STOREYS), sites.LOBBY),
+}  # fmt: skip
 ROWS = tuple(f"{building}/{how}" for building in BUILDINGS for how in HOWS)
 
 

@@ -52,6 +52,7 @@ def test_words_for_places_for_a_plan_that_does_not_fit_and_for_neither() -> None
     assert status_text(several, accepts_taps=False) == "uncertain: 2 places fit, 93 % in all; walk on, turn into a room"
     assert status_text(replace(several, hypotheses=(), right=0.97)).endswith(" m, 3 % elsewhere")
     assert status_text(replace(several, plan_fits=0.1)).startswith("this plan does not fit")
+    assert status_text(replace(several, levels=(0.1,))) == "uncertain: the pressure says another floor"
     assert status_text(replace(told(status=TrackStatus.TRACKING), hypotheses=PLACES)).startswith("tracking")
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats, Ints
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.path import MeasuredSegment
 
 STILL_M, STILL_RAD = 0.01, math.radians(0.5)  # a segment that moves and turns less belongs to the node before it
 # Growth of the path's error per square root of a metre beside the step's own covariance, as the particle filter has it [particles.py]
@@ -76,12 +76,10 @@ def nodes_of(segments: Sequence[MeasuredSegment]) -> tuple[Nodes, Pings]:
         pings.append(np.column_stack([at_x, at_y, axis, measured.range_m, measured.ranger, off, node, along]))
         if moves:
             rows.append((s.t1_s, x + s.dx_m, y + s.dy_m, heading + turn, way + length))
-            sds.append(
-                (
-                    math.hypot(s.sd_m, LEAST_SD_M, MOVE_SD * math.sqrt(length)),
-                    math.hypot(s.turn_sd_rad, _turn_growth(s) * math.sqrt(length)),
-                )
-            )
+            held = s.belt is not None and s.turn_sd_rad < s.belt.foot_turn_sd_rad  # the belt measured its turn
+            growth = (HELD_TURN_SD_RAD if held else TURN_SD_RAD) * math.sqrt(length)
+            move_sd_m = math.hypot(s.sd_m, LEAST_SD_M, MOVE_SD * math.sqrt(length))
+            sds.append((move_sd_m, math.hypot(s.turn_sd_rad, growth)))
     table, sd, ping = np.array(rows), np.array(sds).reshape(-1, 2), np.concatenate(pings)
     nodes = Nodes(table[:, 0], table[:, 1:4].copy(), sd[:, 0], sd[:, 1], table[:, 4])
     axis, range_m, ranger, off, node, share = ping[:, 2:].T.copy()
@@ -93,9 +91,3 @@ def rotated(points: Floats, angle_rad: Floats) -> Floats:
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     x, y = points.T
     return np.column_stack([c * x - s * y, s * x + c * y])
-
-
-def _turn_growth(segment: PathSegment) -> float:
-    """Growth of the heading's error per square root of a metre, beyond the segment's own: less where the belt measured its turn."""
-    held = segment.belt is not None and segment.turn_sd_rad < segment.belt.foot_turn_sd_rad
-    return HELD_TURN_SD_RAD if held else TURN_SD_RAD

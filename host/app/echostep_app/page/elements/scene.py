@@ -23,7 +23,7 @@ from echostep_app.page.elements.marks import BeaconMark, ShownMeeting
 from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.elements.undo_offer import UndoOffer
 from echostep_app.scorecard.track_columns import ScoredPath
-from echostep_app.wearer.steady_status import elsewhere, fitting
+from echostep_app.wearer.steady_status import elsewhere, fitting, other_floor
 
 MOST_SHOWN = 10_000  # particles in a frame
 
@@ -99,6 +99,8 @@ def status_text(
         return "tap where you stand to start" if needs_start else "waiting for the foot to stand still"
     if estimate.plan_fits < PROBABLE:
         return "this plan does not fit: is it another building or floor, or mirrored?"
+    if floor := other_floor(estimate):
+        return f"{estimate.status.value}: {floor}"
     if estimate.status != TrackStatus.TRACKING and estimate.hypotheses and not estimate.is_one_place:
         return f"{estimate.status.value}: {fitting(estimate.hypotheses)}; walk on, turn into a room{tap}"
     if estimate.status == TrackStatus.LOST and not no_plan:

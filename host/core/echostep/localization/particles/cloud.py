@@ -131,7 +131,10 @@ class Cloud(Particles):
         how well the cloud predicted the pings and the path.
         """
         log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
-        self._draw_bends(move)
+        turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
+        self.bend = (
+            self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
+        )  # relative to the bend of BENT of an arc
         progress, settings = MoveProgress(0.0, 0), self._settings
         cloud_model = CloudModel(settings.wall_cost, settings.resample_below, model)
         while progress.share < 1.0 or progress.ping < len(log_evidence):
@@ -261,11 +264,6 @@ class Cloud(Particles):
         noise[:NOISE_BEND] *= np.array([[sd], [sd], [turn_sd], [scale_sd]]) * math.sqrt(share)
         noise[NOISE_BEND] = self.bend
         return noise
-
-    def _draw_bends(self, move: Move) -> None:
-        """Draw the bend of each particle's path on a move, relative to the bend of BENT of an arc."""
-        turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
-        self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
 
     def _roughen(self, rough_m: float, rough_rad: float, walls: WallIndex = NO_WALLS) -> None:
         """Add noise to a scattered cloud, so that copies of one particle try places between the few that fit [Gordon et al. 1993]."""
