@@ -170,6 +170,8 @@ def test_arrays_in_other_units_or_order_are_refused(
     portions = (tuple(each[k : k + 700] for each in samples) for k in range(0, len(walk.t_s), 700))
     with pytest.raises(EchostepError, match=words):
         list(starmap(tracker.feed_samples, portions))
+    with pytest.raises(EchostepError, match=words):
+        echostep.foot.walk_track(*samples)
 
 
 BEGIN_S = 7.0  # of the file's times

@@ -16,6 +16,7 @@ from echostep.additions import svg_of
 from echostep.arrays import Bools, Floats, Ints
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
+from echostep.foot.sample_checks import check_samples
 
 MOST_EXCESS = 0.02  # of the force at rest that is not worth a sentence
 LEG_SHARE = 0.1  # sd of a length by a sensor of unrest 1 on a leg; public recordings of shanks err by 0.1 to 0.13, of thighs by 1 and more
@@ -206,7 +207,11 @@ def walk_track(
     noise: ins.Noise | None = None,
     mag: Floats | None = None,
 ) -> Track:
-    """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live."""
+    """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live.
+
+    Raises EchostepError for samples in other units or not in order, with the factor; ValueError for other shapes.
+    """
+    check_samples(t_s, accel, gyro)
     foot = Foot(settings, noise)
     rows = np.zeros((len(t_s), zupt_state.ROW_SIZE))
     events = foot._run(t_s, accel, gyro, mag, rows)

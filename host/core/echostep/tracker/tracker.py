@@ -31,9 +31,9 @@ from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
+from echostep.foot.sample_checks import check_samples
 from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch
-from echostep.offline.imu_checks import check_samples
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
