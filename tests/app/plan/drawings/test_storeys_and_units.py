@@ -17,7 +17,7 @@ from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import size_m
-from plan.drawings.drawn_houses import WALL, house, sheet
+from plan.drawings.drawn_houses import DOOR, WALL, house, sheet
 
 
 def named_house(space: Any, x: float, y: float, begin: float, name: str) -> None:
@@ -47,6 +47,19 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
     assert [[room.name for room in level.rooms] for level in plan.levels] == [["Hall"], ["Loft"]]
     assert plan.levels[0].doors[0].line == pytest.approx((4.05, 3.0, 4.05, 3.9), abs=0.01)
     assert plan.levels[1].doors[0].line == pytest.approx((4.05, 5.0, 4.05, 5.9), abs=0.05)
+
+
+def test_rows_of_rooms_that_a_door_joins_are_one_storey(tmp_path: Path) -> None:
+    """A corridor with a door at its end, and no other wall between both rows."""
+    doc, space = sheet()
+    house(space, door=True)
+    house(space, y=8.9, door=True)
+    space.add_arc((0.15, 8.0), 0.9, 90, 180, dxfattribs=DOOR)
+    space.add_line((0.15, 8.0), (-0.75, 8.0), DOOR)
+    doc.saveas(tmp_path / "a.dxf")
+    report = ImportReport()
+    import_plan(tmp_path / "a.dxf", report=report)
+    assert report.doubts == []
 
 
 def test_a_window_without_walls_is_refused(tmp_path: Path) -> None:
