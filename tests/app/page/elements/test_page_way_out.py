@@ -20,14 +20,18 @@ from echostep_app.plan.routing import EXIT
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
 from echostep_simulation.scenario import Scenario
-from page.browser import LOOKS, READY, loaded_page, picture, spot, wait_for
-from page.frames import LOCAL, PLAN, scene, told
+from page.browser import DESK, LOOKS, READY, loaded_page, picture, spot, wait_for
+from page.frames import LOCAL, PLAN, scene, served, told
 from page.test_page_browser import SPEECH
 from plan.test_exits import EAST, INNER, SOUTH, house, level
 
 HOUSE = house(level(0.0, Door(SOUTH), Door(EAST), Door(INNER)), level(3.5, Door(INNER)))
 END = "echostep.last.guidance?.path.at(-1)?."
 SIGNS = "[...document.querySelectorAll('#rooms .exit')].filter((e) => e.textContent === 'EXIT' && e.getAttribute('visibility') === 'visible').length"
+WHOLE = """(() => {
+    const signs = [...document.querySelectorAll('#rooms .exit')].map((e) => e.getBoundingClientRect()), map = document.querySelector('#map').getBoundingClientRect();
+    return signs.length === 2 && signs.every((sign) => sign.width > 60 && sign.left >= map.left && sign.right <= map.right);
+})()"""
 SHOWN = "document.querySelector('#guidance').innerText"
 
 
@@ -58,6 +62,14 @@ def test_the_way_out_is_one_tap_and_is_spoken(visit: tuple[Mailbox, Any], tmp_pa
     wait_for(page, "said.at(-1) === 'You are outside.'")
     page.select_option("#goal", "")
     wait_for(page, "document.querySelector('#guidance').hidden")
+
+
+def test_signs_of_exits_are_whole_beside_the_plan(browser: Any) -> None:
+    with served(Mailbox(HOUSE, "test", replay=False)) as (server, mailbox):
+        stands(mailbox, 12.0)
+        page = loaded_page(browser, server.url, {**DESK, "locale": "de-DE"}, READY)
+        page.click("#whole")
+        wait_for(page, WHOLE)
 
 
 def test_a_passage_is_struck_out_by_a_tap_and_the_way_is_made_anew(visit: tuple[Mailbox, Any], tmp_path: Path) -> None:
