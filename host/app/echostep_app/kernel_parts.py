@@ -27,6 +27,7 @@ from numba.core import event
 from echostep.kernel_cache import cache_folder
 
 PARTS = "echostep.tracker.kernels"
+PREPARING = "preparing (kernels are compiled once on a computer)"  # with a share it fits 80 columns
 LOW_PRIORITY = 19  # niceness: a run that goes on meanwhile comes first
 Show = Callable[[float], None]  # told of the share that is done
 

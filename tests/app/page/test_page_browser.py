@@ -14,6 +14,7 @@ import pytest
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
+from echostep_app.kernel_parts import PREPARING
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
@@ -60,6 +61,7 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
     assert beyond == (0, 0)
 
 
+SAME_PLAY = "['t_s', 'playing', 'times'].every((name) => echostep.last.play[name] === stood[name])"
 SHEET = "document.querySelector('#sheet-text').textContent"
 STILL = "!document.getAnimations().length"
 
@@ -176,6 +178,23 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
         page.locator("#time").fill("20")
         wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 20) < 0.1")
         assert page.evaluate("echostep.scene.trail.count") < 30
+        assert not page.wrong
+
+
+def test_a_page_of_a_replay_counts_the_kernels_and_is_where_it_was_after_a_lost_connection(browser: Any) -> None:
+    mailbox = Mailbox(PLAN, "test", replay=True)
+    with PageServer(mailbox, LOCAL) as server:
+        mailbox.show(replace(scene(), status_text=f"{PREPARING}: 12%"))
+        page = looking(browser, server.url, "dark")
+        wait_for(page, f"document.querySelector('#status-text').textContent === '{PREPARING}: 12%'")
+        for t_s in range(60):
+            mailbox.publish(scene(float(t_s)))
+        page.click("#play")
+        page.select_option("#times", "4")
+        page.locator("#time").fill("20")
+        wait_for(page, "(window.stood = echostep.last.play)?.t_s === 20 && stood.times === 4 && !stood.playing")
+        server.show(mailbox)  # ends all connections
+        wait_for(page, f"echostep.last.play !== stood && {SAME_PLAY}")
         assert not page.wrong
 
 

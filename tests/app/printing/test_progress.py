@@ -19,7 +19,7 @@ import echostep.jit  # noqa: F401 (it reports what is compiled)
 from echostep.jit import kernel, part
 from echostep.kernel_cache import on_compiling
 from echostep_app import kernel_parts
-from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
+from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.printing import progress
 from echostep_app.printing.compiling import COMPILING, counting_compiled, tell_of_compiling
 from waiting import PATIENCE_S, until
@@ -28,10 +28,11 @@ from waiting import PATIENCE_S, until
 @pytest.mark.parametrize("terminal", [True, False])
 def test_a_line_says_what_is_done(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> None:
     shown = io.StringIO()
-    monkeypatch.setattr(progress, "console", Console(file=shown, force_terminal=terminal, width=100))
+    monkeypatch.setattr(progress, "console", Console(file=shown, force_terminal=terminal, width=80))
     monkeypatch.setattr(progress, "SHOWN_AFTER_S", 0.01)
-    with progress.progress_line("Preparing"):
-        assert until(lambda: "Preparing" in shown.getvalue())
+    with progress.progress_line(PREPARING.capitalize()) as show:
+        show(1.0)
+        assert until(lambda: PREPARING.capitalize() + (": 100%" if terminal else " ...") in shown.getvalue())
 
 
 class Screen(io.StringIO):

@@ -29,7 +29,8 @@ HOUSE = house(level(0.0, Door(SOUTH), Door(EAST), Door(INNER)), level(3.5, Door(
 END = "echostep.last.guidance?.path.at(-1)?."
 SIGNS = "[...document.querySelectorAll('#rooms .exit')].filter((e) => e.textContent === 'EXIT' && e.getAttribute('visibility') === 'visible').length"
 WHOLE = """(() => {
-    const signs = [...document.querySelectorAll('#rooms .exit')].map((e) => e.getBoundingClientRect()), map = document.querySelector('#map').getBoundingClientRect();
+    const box = (e) => e.getBoundingClientRect(), signs = [...document.querySelectorAll('#rooms .exit')].map(box);
+    const map = box(document.querySelector('#map'));
     return signs.length === 2 && signs.every((sign) => sign.width > 60 && sign.left >= map.left && sign.right <= map.right);
 })()"""
 SHOWN = "document.querySelector('#guidance').innerText"
