@@ -15,21 +15,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from board_runs import quiet_rows
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader, encode
 from echostep.errors import EchostepError
 from echostep_simulation.devices.board import BoardProcess, PythonBoard
-from echostep_simulation.stimulus import NO_SYNC, ROW
+from echostep_simulation.stimulus import ROW
 from simulation.simulated import heard
 
 
 def rows_of(n: int, own_us: tuple[int, int] = (5_831, 7_000), cross_us: tuple[int, int] = (0, 0)) -> NDArray[Any]:
-    rows = np.zeros(n, ROW)
+    rows = quiet_rows(n)
     rows["own_us"], rows["cross_us"] = own_us, cross_us
-    rows["thigh"], rows["calf"], rows["belt"] = 41, -82, 5
-    rows["bearing"], rows["pressure"], rows["temperature"] = 900, 405_296, 400
-    rows["sync_us"] = NO_SYNC
-    rows["sync_us"][::10] = 333
     return rows
 
 

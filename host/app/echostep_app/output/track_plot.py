@@ -37,13 +37,6 @@ MOST_REGIONS = 24  # drawn per level
 EDGE_M = 1.0  # about a walk without a plan
 ROUTE_COLOUR, BEACON_COLOUR = "#cc79a7", "#d55e00"
 TRUTH_COLOUR, TRACK_COLOUR = "#009e73", "#0072b2"  # distinguishable with colour blindness [Okabe and Ito 2008]
-BEGINS: dict[str, Any] = {"marker": "o", "markersize": 7}
-ENDS: dict[str, Any] = {
-    "marker": "s",
-    "markersize": 10,
-    "mfc": "none",
-    "mew": 2,
-}  # about the circle, where a walk ends as it began
 WORDS = {TrackStatus.TRACKING: TRACK_COLOUR, TrackStatus.UNCERTAIN: "#e69f00", TrackStatus.LOST: "#000000"}
 
 
@@ -103,8 +96,8 @@ def _draw_walk(axes: Any, estimates: Sequence[Estimate]) -> None:
     pairs = [(a, b) for a, b in pairwise(estimates) if b.t_s - a.t_s <= GAP_S]
     lines = [((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in pairs]
     axes.add_collection(LineCollection(lines, colors=[WORDS[b.status] for _, b in pairs], linewidths=1.6, zorder=5))
-    for e, sign in zip([*estimates[:1], *estimates[-1:]], (BEGINS, ENDS), strict=False):
-        axes.plot(e.x_m, e.y_m, **sign, color=WORDS[e.status], zorder=6)
+    for e, sign, size, fill in zip([*estimates[:1], *estimates[-1:]], "os", (7, 10), ("full", "none"), strict=False):
+        axes.plot(e.x_m, e.y_m, sign, markersize=size, fillstyle=fill, mew=2, color=WORDS[e.status], zorder=6)
 
 
 def _draw_regions(axes: Any, estimates: Sequence[Estimate]) -> None:
@@ -152,8 +145,8 @@ def _legend(
         (line(color=TRUTH_COLOUR, linewidth=4, alpha=0.45, label="truth"), truth),
         *((line(color=WORDS[word], label=word.value), word in seen) for word in WORDS),
         (line(marker="o", mfc="none", mew=0.8, markersize=9, **sign, label="95 % within"), estimates),
-        (line(**BEGINS, **sign, label="begins"), estimates),
-        (line(**ENDS, **sign, label="ends"), estimates),
+        (line(marker="o", **sign, label="begins"), estimates),
+        (line(marker="s", fillstyle="none", mew=2, **sign, label="ends"), estimates),
         (line(color=ROUTE_COLOUR, linewidth=2, linestyle="--", label="route"), route),
         (line(marker="^", linestyle="", color=BEACON_COLOUR, label="beacon (hollow: moved or silent)"), beacons),
     )  # fmt: skip

@@ -150,12 +150,7 @@ class Session:
         announce = self.page.announce if self.page else lambda _: None
         announce(PREPARING)
         with progress_line(PREPARING.capitalize()) as show:
-
-            def show_share(share: float) -> None:
-                show(share)
-                announce(f"{PREPARING}: {share:.0%}")
-
-            compile_parts([*TRACKING, *more], show_share)
+            compile_parts([*TRACKING, *more], show, lambda share: announce(f"{PREPARING}: {share:.0%}"))
             self.tracker.warm_up()
 
     def show_truth(self, truth: ScoredPath | None) -> None:

@@ -16,7 +16,7 @@ from echostep.additions import svg_of
 from echostep.arrays import Bools, Floats, Ints
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
-from echostep.foot.sample_checks import check_samples
+from echostep.ports.imu_samples import check_samples
 
 MOST_EXCESS = 0.02  # of the force at rest that is not worth a sentence
 LEG_SHARE = 0.1  # sd of a length by a sensor of unrest 1 on a leg; public recordings of shanks err by 0.1 to 0.13, of thighs by 1 and more

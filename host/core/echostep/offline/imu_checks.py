@@ -3,7 +3,7 @@
 
 In: the table (n, 7 or more) of time s, specific force m/s2 and angular rate rad/s; a `Track`. Out: rows in order; messages with advice: a complaint
 when the samples cannot be used, notes when they can with care; how a track contradicts itself. Owns nothing. Without these checks, a dead sensor
-gives a plausible, wrong track. Units and order: `foot.sample_checks`.
+gives a plausible, wrong track. Units and order: `ports.imu_samples`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats, spans
-from echostep.foot.sample_checks import BACK_SHARE, FORCE, RATE, TIME, time_complaint, unit_complaint
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
+from echostep.ports.imu_samples import BACK_SHARE, FORCE, RATE, TIME, time_complaint, unit_complaint
 from echostep.xsens.reader import HELD
 
 SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
