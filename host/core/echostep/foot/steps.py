@@ -209,7 +209,7 @@ def walk_track(
 ) -> Track:
     """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live.
 
-    Raises EchostepError for samples in other units or not in order, with the factor; ValueError for other shapes.
+    Raises EchostepError for other units or another order, with the factor; ValueError for other shapes.
     """
     check_samples(t_s, accel, gyro)
     foot = Foot(settings, noise)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ezdxf.filemanagement import readfile
 
+from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep_app.commands.options import scale_of as scale_option
 from echostep_app.plan.importers.dxf.frame import METRES
@@ -17,7 +18,7 @@ from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import size_m
-from plan.drawings.drawn_houses import DOOR, WALL, house, sheet
+from plan.drawings.drawn_houses import WALL, house, sheet
 
 
 def named_house(space: Any, x: float, y: float, begin: float, name: str) -> None:
@@ -49,17 +50,11 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
     assert plan.levels[1].doors[0].line == pytest.approx((4.05, 5.0, 4.05, 5.9), abs=0.05)
 
 
-def test_rows_of_rooms_that_a_door_joins_are_one_storey(tmp_path: Path) -> None:
-    """A corridor with a door at its end, and no other wall between both rows."""
-    doc, space = sheet()
-    house(space, door=True)
-    house(space, y=8.9, door=True)
-    space.add_arc((0.15, 8.0), 0.9, 90, 180, dxfattribs=DOOR)
-    space.add_line((0.15, 8.0), (-0.75, 8.0), DOOR)
-    doc.saveas(tmp_path / "a.dxf")
+def test_rows_of_rooms_that_doors_join_are_one_storey() -> None:
+    """The office of the manual's pictures: nothing but the doors at both ends of its corridor joins the rows."""
     report = ImportReport()
-    import_plan(tmp_path / "a.dxf", report=report)
-    assert report.doubts == []
+    (level,) = import_plan(ROOT / "tests/captures/office.dxf", report=report).levels
+    assert (report.doubts, len(level.rooms), len(level.doors)) == ([], 12, 14)
 
 
 def test_a_window_without_walls_is_refused(tmp_path: Path) -> None:
