@@ -34,7 +34,7 @@ from page.browser import (
     violations,
     wait_for,
 )
-from page.frames import scene
+from page.frames import scene, served
 from waiting import until
 
 
@@ -111,8 +111,7 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
 
 
 def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
@@ -135,8 +134,7 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
 
 
 def test_a_quick_stroke_does_not_swallow_the_next_tap(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         finger, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
@@ -182,8 +180,7 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
 
 
 def test_a_page_of_a_replay_counts_the_kernels_and_is_where_it_was_after_a_lost_connection(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=True)
-    with PageServer(mailbox, LOCAL) as server:
+    with served(Mailbox(PLAN, "test", replay=True)) as (server, mailbox):
         mailbox.show(replace(scene(), status_text=f"{PREPARING}: 12%"))
         page = looking(browser, server.url, "dark")
         wait_for(page, f"document.querySelector('#status-text').textContent === '{PREPARING}: 12%'")

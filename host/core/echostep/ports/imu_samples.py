@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Samples of any foot IMU in place of an MTx's, as arrays; one rule for their units and order, for arrays and for files.
 
-In: arrays of samples, or a table (n, 7 or more) of time s, specific force m/s2, angular rate rad/s. Out: `ImuSamples`: each sample with a counter
-and an arrival time, both from its own time; complaints with the factor to SI units: wrong units give a plausible, wrong track. Owns the time of the
-first sample.
+In: arrays, or a table (n, 7 or more) of time s, specific force m/s2, angular rate rad/s. Out: `ImuSamples`: each sample with a counter and an arrival
+time, both from its own time; complaints with the factor: wrong units give a plausible, wrong track. Owns the time of the first sample.
 """
 
 from __future__ import annotations
@@ -76,10 +75,7 @@ class SampleCounter:
 
 
 def check_samples(t_s: Floats, accel: Floats, gyro: Floats) -> None:
-    """Refuse what a file would be refused for: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s. Less than FEWEST_SAMPLES may have no rest.
-
-    Raises EchostepError with the factor to multiply or divide by.
-    """
+    """Raise EchostepError, with the factor, where a file would be refused. Less than FEWEST_SAMPLES of t_s, accel and gyro may have no rest."""
     if len(t_s) < FEWEST_SAMPLES or np.shape(accel) != (len(t_s), 3) or np.shape(gyro) != (len(t_s), 3):
         return
     rows = np.column_stack([t_s, accel, gyro])
@@ -125,8 +121,7 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
         return ""
     if option:
         return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
-    advice = too_slow if rate < range_hz[0] else too_fast
-    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
+    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {too_slow if rate < range_hz[0] else too_fast}"
 
 
 def unit_of_times(rate: float, range_hz: tuple[float, float]) -> tuple[str, str, float]:

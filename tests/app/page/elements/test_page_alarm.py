@@ -17,7 +17,7 @@ from echostep_app.page.mailbox import Mailbox, popped
 from echostep_app.page.requests import parse_request
 from echostep_app.page.server import PageServer
 from page.browser import LOCAL, PLAN, looking, picture, violations, wait_for
-from page.frames import scene
+from page.frames import scene, served
 from waiting import until
 
 TEXT = "document.querySelector('#alarm-text').textContent"
@@ -114,8 +114,7 @@ def test_a_page_that_was_not_tapped_says_that_it_cannot_speak(browser: Any) -> N
 
 def test_a_sentence_that_does_not_begin_is_reported_and_one_that_does_is_not(browser: Any) -> None:
     """The engine is played: each sentence is begun, left alone, or ended with an error by the test."""
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         page.evaluate("() => { window.said = []; speechSynthesis.speak = (sentence) => said.push(sentence); }")

@@ -15,7 +15,6 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.elements.marks import BLOCKED, ShownMark, ShownOrder
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import EXIT
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
@@ -39,8 +38,7 @@ SHOWN = "document.querySelector('#guidance').innerText"
 @pytest.fixture
 def visit(browser: Any) -> Iterator[tuple[Mailbox, Any]]:
     """What a wearer in the house is shown, and the page."""
-    mailbox = Mailbox(HOUSE, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served(Mailbox(HOUSE, "test", replay=False)) as (server, mailbox):
         stands(mailbox, 12.0)
         page = loaded_page(browser, server.url, LOOKS["bright"], READY, SPEECH)
         yield mailbox, page
