@@ -18,7 +18,6 @@ from echostep_app.kernel_parts import PREPARING
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import RoutePlace
 from page.browser import (
     LOCAL,
@@ -254,9 +253,8 @@ def ink_near(page: Any, x_m: float, y_m: float) -> bool:
 
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     told = [guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0), None, 0, None) for t, text in SENTENCES]
-    with PageServer(mailbox, LOCAL) as server, opened_page(browser, **LOOKS["bright"]) as page:
+    with served() as (server, mailbox), opened_page(browser, **LOOKS["bright"]) as page:
         page.add_init_script(SPEECH)
         page.goto(server.url)
 
@@ -286,9 +284,8 @@ SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
 
 
 def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 3.0, "", 9.0), None, 0, None))
         mailbox.publish(replace(scene(), guidance=shown))
         page = looking(browser, server.url, "bright")
