@@ -17,12 +17,12 @@ import typer
 
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.file_mode import share_files
+from echostep.kernel_cache import on_compiling
 from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
 from echostep_app.commands.former import former_use
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
-from echostep_app.printing.compiling import tell_of_compiling
 from echostep_app.printing.lines import complain, say
 from echostep_app.printing.people import lost_result, to_people
 
@@ -69,7 +69,7 @@ def options(
 def main() -> None:
     """Entry point: a mistake ends with one line and status 2; signals end a run after its files are written."""
     end_by_signals()
-    tell_of_compiling()
+    on_compiling[:] = [tell_of_compiling]
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its cache lies, for a user without a home
     with to_people():
         status = _status()
@@ -77,6 +77,13 @@ def main() -> None:
             complain(f"echostep: {lost}: what was printed is not whole")
             status = 2
     sys.exit(status)
+
+
+def tell_of_compiling() -> None:
+    """A line for the first kernel that is compiled where nothing counts them (`kernel_parts`)."""
+    on_compiling.clear()
+    if sys.stderr is not None and sys.stderr.isatty():
+        complain("echostep: kernels are compiled, once on this computer: it takes about a minute")
 
 
 def _status() -> int:

@@ -27,6 +27,7 @@ from numba.core import event
 from echostep.kernel_cache import cache_folder
 
 PARTS = "echostep.tracker.kernels"
+PREPARING = "preparing (kernels are compiled once on a computer)"  # with a share it fits 80 columns
 LOW_PRIORITY = 19  # niceness: a run that goes on meanwhile comes first
 Show = Callable[[float], None]  # told of the share that is done
 
@@ -61,7 +62,7 @@ TRACKING = (WALLS, FOOT, BOARD_AND_CLOCKS, CLOUD)  # the longest first
 LATER = (SEARCH, BEACONS)  # what a walk from a known start may come to need
 
 
-def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> None:
+def compile_parts(parts: Sequence[Part], *shows: Show) -> None:
     """Compile the parts that are not in the cache, in a process for each core. A part that fails is compiled by the run when it is first called."""
     shares = _shared_out([part for part in parts if not part.is_compiled], os.cpu_count() or 1)
     count, total = itertools.count(1), sum(part.kernels for share in shares for part in share)
@@ -71,7 +72,9 @@ def compile_parts(parts: Sequence[Part], show: Show = lambda _share: None) -> No
         with suppress(OSError), start_compiling(share) as child:
             children.append(child)
             while child.stdout is not None and child.stdout.read(1):
-                show(min(next(count) / total, 1.0))
+                done = min(next(count) / total, 1.0)
+                for show in shows:
+                    show(done)
 
     with ThreadPoolExecutor(max(len(shares), 1)) as pool:
         try:

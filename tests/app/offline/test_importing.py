@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
-from itertools import starmap
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, digest
 from echostep.offline.imu_csv import Imu
-from echostep.plan import NO_PLAN, Pose, load_plan
+from echostep.plan import Pose, load_plan
 from echostep.ports.chunks import MTX
 from echostep.recording import open_recording
 from echostep.xsens import MtxReader
@@ -153,23 +151,6 @@ def test_arrays_of_any_length_are_tracked_as_the_recording_is(walk: Imu, tmp_pat
     tracker = echostep.Tracker(echostep.plan.load_plan(plan), start)
     with pytest.raises(EchostepError, match=r"must be \(n,\)"):
         tracker.feed_samples(walk.t_s, walk.accel[:, :2], walk.gyro)
-
-
-@pytest.mark.parametrize(("spoilt", "words"), [
-    (lambda t_s, accel, gyro: (t_s, accel / 9.80665, gyro), "look like g .* multiply them by 9.80665"),
-    (lambda t_s, accel, gyro: (t_s, accel, np.degrees(gyro)), "multiply them by pi/180"),
-    (lambda t_s, accel, gyro: (1e3 * t_s, accel, gyro), "in milliseconds. divide it by 1000"),
-    (lambda t_s, accel, gyro: (t_s[::-1], accel, gyro), "t_s goes back in 100 %"),
-])  # fmt: skip
-def test_arrays_in_other_units_or_order_are_refused(
-    walk: Imu, spoilt: Callable[..., tuple[Floats, Floats, Floats]], words: str
-) -> None:
-    """By the words and rules for files; large portions, too."""
-    samples = spoilt(walk.t_s, walk.accel, walk.gyro)
-    tracker = echostep.Tracker(NO_PLAN, None, echostep.Settings.of_imu(100.0))
-    portions = (tuple(each[k : k + 700] for each in samples) for k in range(0, len(walk.t_s), 700))
-    with pytest.raises(EchostepError, match=words):
-        list(starmap(tracker.feed_samples, portions))
 
 
 BEGIN_S = 7.0  # of the file's times

@@ -58,7 +58,7 @@ CUT = """(() => {
 STATUSES = (
     "tap where you stand to start",
     "waiting for the foot to stand still",
-    "preparing; the first time on a computer its kernels are compiled, which takes about a minute",
+    "preparing (kernels are compiled once on a computer): 12%",
     "tracking, outside the building, 0.4 m",
     "uncertain, 12 m above the start, 40 m",
     "lost: nothing from the foot for 120 s",

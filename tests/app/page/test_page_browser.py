@@ -14,10 +14,10 @@ import pytest
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
+from echostep_app.kernel_parts import PREPARING
 from echostep_app.page.elements.guidance import ShownGuidance, guidance_of_cue
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import RoutePlace
 from page.browser import (
     LOCAL,
@@ -33,7 +33,7 @@ from page.browser import (
     violations,
     wait_for,
 )
-from page.frames import scene
+from page.frames import scene, served
 from waiting import until
 
 
@@ -60,6 +60,7 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
     assert beyond == (0, 0)
 
 
+SAME_PLAY = "['t_s', 'playing', 'times'].every((name) => echostep.last.play[name] === stood[name])"
 SHEET = "document.querySelector('#sheet-text').textContent"
 STILL = "!document.getAnimations().length"
 
@@ -109,8 +110,7 @@ def test_keys_alone_check_in_and_choose_a_way(browser: Any) -> None:
 
 
 def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         before = page.evaluate("[echostep.view.scale, echostep.view.turn]")
@@ -133,8 +133,7 @@ def test_two_fingers_zoom_and_rotate(browser: Any) -> None:
 
 
 def test_a_quick_stroke_does_not_swallow_the_next_tap(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         finger, box = page.context.new_cdp_session(page), page.locator("#map").bounding_box()
@@ -176,6 +175,22 @@ def test_a_replay_plays_stops_and_seeks(browser: Any, tmp_path: Path) -> None:
         page.locator("#time").fill("20")
         wait_for(page, "Math.abs(echostep.scene.frame.play.t_s - 20) < 0.1")
         assert page.evaluate("echostep.scene.trail.count") < 30
+        assert not page.wrong
+
+
+def test_a_page_of_a_replay_counts_the_kernels_and_is_where_it_was_after_a_lost_connection(browser: Any) -> None:
+    with served(Mailbox(PLAN, "test", replay=True)) as (server, mailbox):
+        mailbox.show(replace(scene(), status_text=f"{PREPARING}: 12%"))
+        page = looking(browser, server.url, "dark")
+        wait_for(page, f"document.querySelector('#status-text').textContent === '{PREPARING}: 12%'")
+        for t_s in range(60):
+            mailbox.publish(scene(float(t_s)))
+        page.click("#play")
+        page.select_option("#times", "4")
+        page.locator("#time").fill("20")
+        wait_for(page, "(window.stood = echostep.last.play)?.t_s === 20 && stood.times === 4 && !stood.playing")
+        server.show(mailbox)  # ends all connections
+        wait_for(page, f"echostep.last.play !== stood && {SAME_PLAY}")
         assert not page.wrong
 
 
@@ -238,9 +253,8 @@ def ink_near(page: Any, x_m: float, y_m: float) -> bool:
 
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     told = [guidance_of_cue(Cue(t, CueKind.TURN, text, 0.5, f"{text}.", 9.0), None, 0, None) for t, text in SENTENCES]
-    with PageServer(mailbox, LOCAL) as server, opened_page(browser, **LOOKS["bright"]) as page:
+    with served() as (server, mailbox), opened_page(browser, **LOOKS["bright"]) as page:
         page.add_init_script(SPEECH)
         page.goto(server.url)
 
@@ -270,9 +284,8 @@ SENTENCES = ((1.0, "Turn left"), (2.0, "Turn right"), (3.0, "Turn left"))
 
 
 def test_the_arrow_turns_the_short_way_and_is_gone_when_the_heading_is_unknown(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     turn = "document.querySelector('#arrow').style.transform"
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         shown = replace(guidance_of_cue(Cue(1.0, CueKind.TURN, "Turn left", 3.0, "", 9.0), None, 0, None))
         mailbox.publish(replace(scene(), guidance=shown))
         page = looking(browser, server.url, "bright")

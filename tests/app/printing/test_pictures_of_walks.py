@@ -54,6 +54,12 @@ def test_a_walk_is_drawn_in_outlines_on_its_plan(walk: echostep.Walk) -> None:
     assert {to_hex(tuple(edge)) for edge in edges.tolist()} == {
         WORDS[TrackStatus(w)] for w in ("tracking", "uncertain")
     }
+    begins, ends = (next(each for each in axes.lines if each.get_marker() == sign) for sign in "os")
+    assert (begins.get_fillstyle(), ends.get_fillstyle()) == (
+        "full",
+        "none",
+    )  # both are seen where a walk ends as it began
+    assert all(text.get_path_effects() for text in axes.texts)  # legible over the walk
     assert np.ptp(axes.get_xlim()) < 1.1 * np.ptp(walk.plan.levels[0].walls[:, ::2])
 
 

@@ -19,19 +19,20 @@ import echostep.jit  # noqa: F401 (it reports what is compiled)
 from echostep.jit import kernel, part
 from echostep.kernel_cache import on_compiling
 from echostep_app import kernel_parts
-from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
+from echostep_app.cli import tell_of_compiling
+from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.printing import progress
-from echostep_app.printing.compiling import COMPILING, counting_compiled, tell_of_compiling
 from waiting import PATIENCE_S, ran, until
 
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_a_line_says_what_is_done(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> None:
     shown = io.StringIO()
-    monkeypatch.setattr(progress, "console", Console(file=shown, force_terminal=terminal, width=100))
+    monkeypatch.setattr(progress, "console", Console(file=shown, force_terminal=terminal, width=80))
     monkeypatch.setattr(progress, "SHOWN_AFTER_S", 0.01)
-    with progress.progress_line("Preparing"):
-        assert until(lambda: "Preparing" in shown.getvalue())
+    with progress.progress_line(PREPARING.capitalize()) as show:
+        show(1.0)
+        assert until(lambda: PREPARING.capitalize() + (": 100%" if terminal else " ...") in shown.getvalue())
 
 
 class Screen(io.StringIO):
@@ -48,36 +49,19 @@ class Screen(io.StringIO):
 @pytest.fixture(autouse=True)
 def _told_anew() -> Iterator[None]:
     before = list(on_compiling)
-    tell_of_compiling()
     yield
     on_compiling[:] = before
 
 
-def compile_two() -> None:
-    """Two kernels without a cache; the second calls another one."""
-    inner = numba.njit(lambda x: x + 1)
-    numba.njit(lambda x: x - 1)(1)
-    numba.njit(lambda x: inner(x))(1)  # noqa: PLW0108 (a kernel that calls a kernel)
-
-
-def test_progress_that_is_shown_counts_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen, counts = Screen(terminal=True), list[int]()
-    monkeypatch.setattr(sys, "stderr", screen)
-    with counting_compiled(counts.append):
-        compile_two()
-    assert counts == [1, 2]  # the inner one is compiled within
-    assert not screen.getvalue()
-    numba.njit(lambda x: x)(1)
-    assert screen.getvalue() == f"{COMPILING}\n"
-
-
-def test_a_kernel_that_is_kept_is_not_compiled() -> None:
+@pytest.mark.parametrize("terminal", [True, False])
+def test_the_first_kernel_is_told_once_on_a_terminal(monkeypatch: pytest.MonkeyPatch, terminal: bool) -> None:
+    monkeypatch.setattr(sys, "stderr", screen := Screen(terminal=terminal))
     kept = numba.njit(lambda x: x)
-    kept(1)
-    counts = list[int]()
-    with counting_compiled(counts.append):
-        kept(2)
-    assert not counts
+    on_compiling[:] = [tell_of_compiling]
+    for _ in range(2):
+        kept(1)
+    numba.njit(lambda x: x + 1)(1)
+    assert screen.getvalue().count("kernels are compiled, once") == terminal
 
 
 RUN = """

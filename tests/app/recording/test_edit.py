@@ -248,6 +248,7 @@ FILES = {
     "plan.ifcxml": b'<?xml version="1.0"?>',
     "foot.csv": FOOT,
     "foot16.csv": FOOT[3:].decode().encode("utf-16"),
+    "mt.txt": b"// Update Rate: 100.0Hz\nPacketCounter\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\n0\t0\t0\t9.8\t0\t0\t0\n",
     "leg.csv": b"t_s,thigh_rad_s,shank_rad_s\n0,0,0\n",
     "air.csv": b"t_s,pressure_pa\n0,101325\n",
     "track.csv": b"t_s,x_m,y_m\n0,1,2\n",

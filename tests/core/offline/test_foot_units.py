@@ -13,7 +13,12 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
+from echostep.foot.steps import walk_track
 from echostep.offline.imu_csv import load_imu
+from echostep.plan import NO_PLAN
+from echostep.ports.imu_samples import FEWEST_SAMPLES
+from echostep.settings import Settings
+from echostep.tracker import Tracker
 from echostep_simulation.people.rolling_foot import MANNERS, course, samples
 
 WALK = course(MANNERS["walking"], 20, np.random.default_rng(7))
@@ -59,6 +64,16 @@ def test_other_units_are_asked_about_with_the_remedy(tmp_path: Path, columns: Sa
     path.write_text(text_of(columns))
     with pytest.raises(EchostepError, match=said):
         load_imu(path)
+    if len(columns[0]) < FEWEST_SAMPLES:  # arrays of a moment may have no rest
+        return
+    for take in (walk_track, Tracker(NO_PLAN, None, Settings.of_imu(100.0)).feed_samples):
+        with pytest.raises(EchostepError, match=said):
+            take(*columns)
+
+
+def test_arrays_in_reversed_order_are_refused() -> None:
+    with pytest.raises(EchostepError, match="t_s goes back in 100 %"):
+        walk_track(T_S[::-1], ACCEL, GYRO)
 
 
 def test_a_clock_of_the_epoch_is_no_fault(tmp_path: Path) -> None:

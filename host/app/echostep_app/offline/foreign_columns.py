@@ -28,10 +28,10 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.offline.csv_table import CsvLimits, column_of, header_of, is_comment, number_of, read_rows, unit_of_times
+from echostep.offline.csv_table import CsvLimits, column_of, header_of, is_comment, number_of, read_rows
 from echostep.offline.header import Header
-from echostep.offline.imu_checks import RATE_RANGE_HZ
 from echostep.offline.imu_csv import COLUMNS
+from echostep.ports.imu_samples import RATE_RANGE_HZ, unit_of_times
 
 # Quantity and factor to the SI unit of each unit; standard gravity [CGPM 1901].
 UNITS = {

@@ -21,7 +21,8 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.offline.bursts import spread
 from echostep.offline.csv_table import CsvLimits, lines_of, open_samples
-from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time, time_complaint
+from echostep.offline.imu_checks import MISSING_SHARE, missing_share, sorted_by_time
+from echostep.ports.imu_samples import time_complaint
 from echostep_app.offline.foreign_columns import ADVICE, OWN, Naming, read_header
 from echostep_app.offline.leg_gyros import find_clipping_limits, repair_clipping, walking_axis
 

@@ -90,14 +90,14 @@ def _near(truth: ScoredPath, estimates: Sequence[Estimate]) -> Floats:
 
 
 def _draw_walk(axes: Any, estimates: Sequence[Estimate]) -> None:
-    """The line of the positions, each piece in the colour of its word; a circle where it begins, a square where it ends."""
+    """The line of the positions, each piece in the colour of its word; a disc where it begins, a frame where it ends."""
     from matplotlib.collections import LineCollection
 
     pairs = [(a, b) for a, b in pairwise(estimates) if b.t_s - a.t_s <= GAP_S]
     lines = [((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in pairs]
     axes.add_collection(LineCollection(lines, colors=[WORDS[b.status] for _, b in pairs], linewidths=1.6, zorder=5))
-    for e, sign in zip([*estimates[:1], *estimates[-1:]], "os", strict=False):
-        axes.plot(e.x_m, e.y_m, sign, markersize=7, color=WORDS[e.status], zorder=6)
+    for e, sign, size, fill in zip([*estimates[:1], *estimates[-1:]], "os", (7, 10), ("full", "none"), strict=False):
+        axes.plot(e.x_m, e.y_m, sign, markersize=size, fillstyle=fill, mew=2, color=WORDS[e.status], zorder=6)
 
 
 def _draw_regions(axes: Any, estimates: Sequence[Estimate]) -> None:
@@ -146,7 +146,7 @@ def _legend(
         *((line(color=WORDS[word], label=word.value), word in seen) for word in WORDS),
         (line(marker="o", mfc="none", mew=0.8, markersize=9, **sign, label="95 % within"), estimates),
         (line(marker="o", **sign, label="begins"), estimates),
-        (line(marker="s", **sign, label="ends"), estimates),
+        (line(marker="s", fillstyle="none", mew=2, **sign, label="ends"), estimates),
         (line(color=ROUTE_COLOUR, linewidth=2, linestyle="--", label="route"), route),
         (line(marker="^", linestyle="", color=BEACON_COLOUR, label="beacon (hollow: moved or silent)"), beacons),
     )  # fmt: skip

@@ -137,8 +137,7 @@ class LivePage:
 
     def announce(self, text: str) -> None:
         """Show the run's activity, until its first bytes."""
-        if not self._replay:
-            self.mailbox.publish(replace(self._scene, status_text=text))
+        self.mailbox.show(replace(self._scene, status_text=text))
 
     def wait_for_page(self) -> None:
         """Wait until a browser shows the page, for at most `OPENING_S`."""

@@ -119,6 +119,10 @@ class Mailbox:
         if self.replay:
             self.history.add(scene)
         self.over_time.note(scene)
+        self.show(scene)
+
+    def show(self, scene: PageScene) -> None:
+        """Show a scene that is no part of the walk, and call `on_publish`."""
         self.latest = scene
         self._announce()
 

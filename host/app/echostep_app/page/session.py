@@ -142,7 +142,7 @@ class PageSession(GuardedSocket):
         if self._player is None:
             return self._mailbox.latest
         t_s = self._player.move(time.monotonic())
-        return None if t_s is None else self._mailbox.history.at(t_s)
+        return self._mailbox.latest if t_s is None else self._mailbox.history.at(t_s)
 
     def _is_new(self, scene: PageScene) -> bool:
         """Whether the page lacks something of what it would be sent with a scene."""

@@ -17,7 +17,6 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from echostep_app.printing.compiling import counting_compiled
 from echostep_app.printing.console import console
 
 SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal: what ends before needs no line
@@ -26,7 +25,7 @@ Item = TypeVar("Item")
 
 @contextmanager
 def progress_line(text: str) -> Iterator[Callable[[float], None]]:
-    """Show the name of the work while the block runs, and the number of compiled kernels; the block is given a function that shows a share."""
+    """Show the name of the work while the block runs; the block is given a function that shows a share."""
     if not console.is_terminal:
         timer = Timer(SHOWN_AFTER_S, console.print, [f"{text} ..."])
         timer.daemon = True
@@ -40,8 +39,7 @@ def progress_line(text: str) -> Iterator[Callable[[float], None]]:
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
     ) as bars:
         task = bars.add_task(text, total=None)
-        with counting_compiled(lambda count: bars.update(task, description=f"{text}: {count} compiled")):
-            yield lambda share: bars.update(task, description=f"{text}: {share:.0%}")
+        yield lambda share: bars.update(task, description=f"{text}: {share:.0%}")
 
 
 def with_bar(

@@ -27,7 +27,7 @@ from echostep.tracker import Tracker
 from echostep_app.extras import lacks
 from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
-from echostep_app.kernel_parts import LATER, TRACKING, Part, compile_parts, compiling_later
+from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.mailbox import popped
@@ -147,11 +147,10 @@ class Session:
 
     def prepare(self, *more: Part) -> None:
         """Compile missing kernels, before the first bytes come: the tracker's, and more."""
-        text = "Preparing; the first time on a computer its kernels are compiled, which takes about a minute"
-        if self.page:
-            self.page.announce(f"{text[0].lower()}{text[1:]}")
-        with progress_line(text) as show:
-            compile_parts([*TRACKING, *more], show)
+        announce = self.page.announce if self.page else lambda _: None
+        announce(PREPARING)
+        with progress_line(PREPARING.capitalize()) as show:
+            compile_parts([*TRACKING, *more], show, lambda share: announce(f"{PREPARING}: {share:.0%}"))
             self.tracker.warm_up()
 
     def show_truth(self, truth: ScoredPath | None) -> None:

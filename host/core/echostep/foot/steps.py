@@ -16,6 +16,7 @@ from echostep.additions import svg_of
 from echostep.arrays import Bools, Floats, Ints
 from echostep.foot import ins, stance, zupt_ins, zupt_state
 from echostep.foot.magnetometer import MEASURED, TRUSTED, new_compass
+from echostep.ports.imu_samples import check_samples
 
 MOST_EXCESS = 0.02  # of the force at rest that is not worth a sentence
 LEG_SHARE = 0.1  # sd of a length by a sensor of unrest 1 on a leg; public recordings of shanks err by 0.1 to 0.13, of thighs by 1 and more
@@ -212,7 +213,11 @@ def walk_track(
     noise: ins.Noise | None = None,
     mag: Floats | None = None,
 ) -> Track:
-    """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live."""
+    """Track of a whole walk, samples t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s; bit for bit as by `Foot` live.
+
+    Raises EchostepError for other units or another order, with the factor; ValueError for other shapes.
+    """
+    check_samples(t_s, accel, gyro)
     foot = Foot(settings, noise)
     found = foot.track(t_s, accel, gyro, mag)
     t_s = np.asarray(t_s, np.float64)

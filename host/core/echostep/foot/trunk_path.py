@@ -24,10 +24,7 @@ from echostep.foot.zupt_ins import GAP_S
 from echostep.path import STANDING_PIECE_S, PathSegment
 
 # The source of these limits is not recorded.
-HALVES, RUN_HALVES = (
-    7,
-    3,
-)  # stances whose median duration counts, walking and running; one alone may have been cut off by a gap
+HALVES, RUN_HALVES = 7, 3  # stances whose median duration counts, walking and running: a gap may cut one off
 STANDING_S = 0.8  # duration of a stance; longer ones are standing
 LONGEST_HALF_S = 0.35
 REACH_M = 0.4  # of a leg, ahead of the trunk: half a long step

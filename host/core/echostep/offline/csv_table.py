@@ -29,7 +29,6 @@ UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # byte order marks [Unicode 2.13]: Excel's 
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
-TIME_UNITS = ("seconds", "s", 1.0), ("milliseconds", "ms", 1e3), ("microseconds", "us", 1e6), ("nanoseconds", "ns", 1e9)
 
 Result = TypeVar("Result")
 
@@ -127,22 +126,6 @@ def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequ
         share = f"{100 * bad / len(numbers):.0f} % of the first {len(numbers)} rows"
         raise ValueError(f"{share} have no number in some column, or more cells than there are names")
     return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
-
-
-def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, too_fast: str) -> str:
-    """Message for a sample rate (Hz) outside the range, with the likely unit of t_s or else the given advice; empty inside."""
-    unit, option, factor = unit_of_times(rate, range_hz)
-    if option == "s":
-        return ""
-    if option:
-        return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
-    advice = too_slow if rate < range_hz[0] else too_fast
-    return f"t_s gives {rate:.3g} samples a second: is it in seconds? {advice}"
-
-
-def unit_of_times(rate: float, range_hz: tuple[float, float]) -> tuple[str, str, float]:
-    """Name, option and number in a second of the unit in which times of this rate (Hz, if they were seconds) are in the range; "" for none."""
-    return next((unit for unit in TIME_UNITS if range_hz[0] <= rate * unit[2] <= range_hz[1]), ("", "", 0.0))
 
 
 def number_of(text: str) -> float:

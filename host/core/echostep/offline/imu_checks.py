@@ -2,8 +2,8 @@
 """Checks of the samples of a recorded foot IMU, and of the track computed from them.
 
 In: the table (n, 7 or more) of time s, specific force m/s2 and angular rate rad/s; a `Track`. Out: rows in order; messages with advice: a complaint
-when the samples cannot be used, notes when they can with care; how a track contradicts itself. Owns nothing. Without these checks, wrong units or a
-dead sensor give a plausible, wrong track.
+when the samples cannot be used, notes when they can with care; how a track contradicts itself. Owns nothing. Without these checks, a dead sensor
+gives a plausible, wrong track. Units and order: `ports.imu_samples`.
 """
 
 from __future__ import annotations
@@ -14,30 +14,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from echostep.arrays import Floats, spans
-from echostep.errors import EchostepError
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
-from echostep.offline.csv_table import rate_complaint
+from echostep.ports.imu_samples import BACK_SHARE, FORCE, RATE, TIME, time_complaint, unit_complaint
 from echostep.xsens.reader import HELD
 
-TIME = 0  # columns of the table
-FORCE = slice(1, 4)
-RATE = slice(4, 7)
 SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
-CALMEST_SHARE = 0.1  # share of the samples in which a foot surely stands
-# Of the specific force at rest: 30 % for errors of the sensor and a foot not quite at rest
-GRAVITY_RANGE_M_S2 = (7.0, 13.0)
-G_RANGE = (0.7, 1.3)  # the same in units of gravity
-FASTEST_FOOT_RAD_S = 40.0  # 2300 deg/s; common gyros end at 2000 deg/s
-FASTEST_QUANTILE = 0.999  # of the rates, compared with that limit: single spikes are left out
-RATE_RANGE_HZ = (45.0, 550.0)  # 50 to 500 Hz with a margin of 10 %
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
 WRAPS_S = (2**32 * 1e-6, 2**32 * 1e-3, 2**16 * 1e-3)  # of counters in microseconds or milliseconds
 LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
-BACK_SHARE = 0.02  # largest share of rows whose time goes back
-REPEATED_SHARE = 0.6  # largest share of rows that repeat the time before
 MISSING_SHARE = 0.02  # share of missing samples that is reported
 CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
 FEWEST_REPEATS = 3  # of equal neighbours at the limit
@@ -46,8 +33,6 @@ DEAD_SHARE = 0.5  # share of rows that repeat, from which on a sensor is dead
 DEAD_S = 2.0  # longest time without a change while the foot moves
 MOVING_RAD_S = 0.5  # rate of a moving foot
 MOVING_SHARE = 0.1  # of a stretch without a change in which the foot moves
-OF_NO_UNIT = 1e6  # force or rate that no unit of a sample gives
-FEWEST_SAMPLES, FIRST = 500, 3000  # of arrays that are checked: 1 to 10 s, 6 to 60 s
 SHORTEST_STEP_S = 0.05  # lower bound of a step's duration where its speed is computed
 FASTEST_WALK_M_S = 8.0  # median speed of the foot over a step
 FORCED_SAMPLES = 5  # samples of rest accepted against the innovation gate
@@ -92,35 +77,7 @@ def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 def complaint(table: Floats, columns: Sequence[str]) -> str:
     """Why the samples cannot be used, as a message; empty when they can."""
-    return time_complaint(table[:, TIME], "a foot") or _dead_complaint(table, columns) or _unit_complaint(table)
-
-
-def check_samples(t_s: Floats, accel: Floats, gyro: Floats) -> None:
-    """Refuse what a file would be refused for: t_s (n,) s, accel (n, 3) m/s2, gyro (n, 3) rad/s. Less than FEWEST_SAMPLES may have no rest.
-
-    Raises EchostepError with the factor to multiply or divide by.
-    """
-    if len(t_s) < FEWEST_SAMPLES or np.shape(accel) != (len(t_s), 3) or np.shape(gyro) != (len(t_s), 3):
-        return
-    rows = np.column_stack([t_s, accel, gyro])[:FIRST]
-    rows = rows[np.isfinite(rows[:, TIME]) & (np.abs(rows[:, FORCE.start :]) < OF_NO_UNIT).all(axis=1)]
-    if len(rows) and (wrong := time_complaint(rows[:, TIME], "a foot") or _unit_complaint(rows)):
-        raise EchostepError(f"samples: {wrong}")
-
-
-def time_complaint(t_s: Floats, what: str) -> str:
-    """Message for the times (n,) of `what` that go back, repeat, or have another unit."""
-    steps = np.diff(t_s)
-    back = float((steps < 0).mean()) if len(steps) else 0.0
-    if back > BACK_SHARE:
-        return f"t_s goes back in {100 * back:.0f} % of the rows, even when sorted: are several recordings mixed?"
-    forward = steps[steps > 0]
-    if not len(forward):
-        return "t_s does not advance"
-    if (steps == 0.0).mean() > REPEATED_SHARE:
-        return f"t_s repeats itself in {100 * (steps == 0.0).mean():.0f} % of the rows: are several recordings mixed?"
-    rate = 1.0 / float(np.median(forward))
-    return rate_complaint(rate, RATE_RANGE_HZ, f"{what} needs 50 at least", "average them down to 500 or fewer")
+    return time_complaint(table[:, TIME], "a foot") or _dead_complaint(table, columns) or unit_complaint(table)
 
 
 def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
@@ -137,26 +94,6 @@ def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
                 longest, since = span, float(table[begin, TIME])
                 dead = f"{name} does not change for {span:.1f} s from {since:.2f} s on, while the foot moves: is that sensor alive?"
     return dead
-
-
-def _unit_complaint(table: Floats) -> str:
-    """Message for forces in g or without gravity, and for rates in deg/s."""
-    force = _resting_force(table)
-    if G_RANGE[0] <= force <= G_RANGE[1]:
-        return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665, or say --units g"
-    if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
-        return f"ax, ay, az are {force:.3g} at rest, gravity is 9.8 m/s2: wrong unit, or gravity was removed"
-    fastest = float(np.quantile(np.abs(table[:, RATE]), FASTEST_QUANTILE))
-    if fastest > FASTEST_FOOT_RAD_S:
-        return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180, or say --units deg/s"
-    return ""
-
-
-def _resting_force(table: Floats) -> float:
-    """Median specific force (m/s2) while the foot turns least; over all samples of a run the median is far above gravity."""
-    rate = np.linalg.norm(table[:, RATE], axis=1)
-    calm = rate <= np.quantile(rate, CALMEST_SHARE)
-    return float(np.median(np.linalg.norm(table[calm, FORCE], axis=1)))
 
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:

@@ -33,11 +33,10 @@ from echostep.echoes.rangers import echo_of
 from echostep.errors import EchostepError
 from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch
-from echostep.offline.imu_checks import check_samples
 from echostep.path import Dropout, MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN, Plan, Pose
 from echostep.ports.chunks import FOOT, GATEWAY, Chunk, Portion, portion_of
-from echostep.ports.imu_samples import SampleCounter
+from echostep.ports.imu_samples import SampleCounter, check_samples
 from echostep.ports.people.check_in import HEADING_SD_RAD, PERSON, Call, CheckIn, Undo, parse_person
 from echostep.ports.people.meeting import MEETING
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon

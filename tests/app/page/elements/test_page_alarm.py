@@ -13,11 +13,10 @@ import pytest
 from echostep.odometry import Alarm, AlarmKind, AlarmReason, WearerWatch
 from echostep.ports.people.check_in import Call
 from echostep_app.page.elements.alarm import ShownAlarm, shown_alarm
-from echostep_app.page.mailbox import Mailbox, popped
+from echostep_app.page.mailbox import popped
 from echostep_app.page.requests import parse_request
-from echostep_app.page.server import PageServer
-from page.browser import LOCAL, PLAN, looking, picture, violations, wait_for
-from page.frames import scene
+from page.browser import looking, picture, violations, wait_for
+from page.frames import scene, served
 from waiting import until
 
 TEXT = "document.querySelector('#alarm-text').textContent"
@@ -71,9 +70,8 @@ def test_calls_are_requests_and_half_a_call_is_none() -> None:
 
 @pytest.mark.parametrize("look", ["bright", "dark"])
 def test_the_page_asks_and_nothing_keeps_anybody_from_answering(browser: Any, look: str, tmp_path: Path) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     asking = ShownAlarm("asking", "Are you all right? Move, or tap. In 9 s it is a mayday.", "Are you all right?", 1)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(replace(scene(), alarm=asking))
         page = looking(browser, server.url, look)
         wait_for(page, f"{TEXT}.startsWith('Are you all right?')")
@@ -100,9 +98,8 @@ UNSPOKEN = "document.querySelector('#unspoken')"
 
 def test_a_page_that_was_not_tapped_says_that_it_cannot_speak(browser: Any) -> None:
     """The browser's own answer: it speaks, or the page says that it did not; in Chromium without a tap or a voice it does not."""
-    mailbox = Mailbox(PLAN, "test", replay=False)
     asking = ShownAlarm("asking", "Are you all right? Move, or tap.", "Are you all right?", 1)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         assert page.inner_text("#invitation") == "This page cannot speak before it is tapped: tap here"
@@ -114,8 +111,7 @@ def test_a_page_that_was_not_tapped_says_that_it_cannot_speak(browser: Any) -> N
 
 def test_a_sentence_that_does_not_begin_is_reported_and_one_that_does_is_not(browser: Any) -> None:
     """The engine is played: each sentence is begun, left alone, or ended with an error by the test."""
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         page.evaluate("() => { window.said = []; speechSynthesis.speak = (sentence) => said.push(sentence); }")

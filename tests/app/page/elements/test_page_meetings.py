@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 from echostep.aiding import MeetingEffect
 from echostep_app.page.elements.marks import WORDS, ShownMeeting
-from echostep_app.page.mailbox import Mailbox, popped
+from echostep_app.page.mailbox import popped
 from echostep_app.page.requests import Met, parse_request
-from echostep_app.page.server import PageServer
-from page.browser import LOCAL, PLAN, looking, violations, wait_for
-from page.frames import scene
+from page.browser import looking, violations, wait_for
+from page.frames import scene, served
 from waiting import until
 
 
@@ -32,9 +31,8 @@ def test_a_meeting_needs_a_name(name: object) -> None:
 
 
 def test_a_teammate_is_chosen_and_the_page_says_what_it_did(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
     met: list[str] = []
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")
         wait_for(page, "echostep.last !== null && document.querySelector('#met').hidden")

@@ -15,27 +15,30 @@ from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.elements.marks import BLOCKED, ShownMark, ShownOrder
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.server import PageServer
 from echostep_app.plan.routing import EXIT
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
 from echostep_simulation.scenario import Scenario
-from page.browser import LOOKS, READY, loaded_page, picture, spot, wait_for
-from page.frames import LOCAL, PLAN, scene, told
+from page.browser import DESK, LOOKS, READY, loaded_page, picture, spot, wait_for
+from page.frames import LOCAL, PLAN, scene, served, told
 from page.test_page_browser import SPEECH
 from plan.test_exits import EAST, INNER, SOUTH, house, level
 
 HOUSE = house(level(0.0, Door(SOUTH), Door(EAST), Door(INNER)), level(3.5, Door(INNER)))
 END = "echostep.last.guidance?.path.at(-1)?."
 SIGNS = "[...document.querySelectorAll('#rooms .exit')].filter((e) => e.textContent === 'EXIT' && e.getAttribute('visibility') === 'visible').length"
+WHOLE = """(() => {
+    const box = (e) => e.getBoundingClientRect(), signs = [...document.querySelectorAll('#rooms .exit')].map(box);
+    const map = box(document.querySelector('#map'));
+    return signs.length === 2 && signs.every((sign) => sign.width > 60 && sign.left >= map.left && sign.right <= map.right);
+})()"""
 SHOWN = "document.querySelector('#guidance').innerText"
 
 
 @pytest.fixture
 def visit(browser: Any) -> Iterator[tuple[Mailbox, Any]]:
     """What a wearer in the house is shown, and the page."""
-    mailbox = Mailbox(HOUSE, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served(Mailbox(HOUSE, "test", replay=False)) as (server, mailbox):
         stands(mailbox, 12.0)
         page = loaded_page(browser, server.url, LOOKS["bright"], READY, SPEECH)
         yield mailbox, page
@@ -58,6 +61,14 @@ def test_the_way_out_is_one_tap_and_is_spoken(visit: tuple[Mailbox, Any], tmp_pa
     wait_for(page, "said.at(-1) === 'You are outside.'")
     page.select_option("#goal", "")
     wait_for(page, "document.querySelector('#guidance').hidden")
+
+
+def test_signs_of_exits_are_whole_beside_the_plan(browser: Any) -> None:
+    with served(Mailbox(HOUSE, "test", replay=False)) as (server, mailbox):
+        stands(mailbox, 12.0)
+        page = loaded_page(browser, server.url, {**DESK, "locale": "de-DE"}, READY)
+        page.click("#whole")
+        wait_for(page, WHOLE)
 
 
 def test_a_passage_is_struck_out_by_a_tap_and_the_way_is_made_anew(visit: tuple[Mailbox, Any], tmp_path: Path) -> None:

@@ -12,9 +12,8 @@ import pytest
 
 from echostep_app.page.elements.scene import ParticleSample
 from echostep_app.page.mailbox import Mailbox
-from echostep_app.page.server import PageServer
-from page.browser import LOCAL, PLAN, Walk, looking
-from page.frames import scene
+from page.browser import Walk, looking
+from page.frames import scene, served
 
 
 @pytest.mark.speed
@@ -38,8 +37,7 @@ def test_latency_from_a_step_to_the_pixel(browser: Any) -> None:
 
 @pytest.mark.speed
 def test_frame_rate_with_ten_thousand_particles(browser: Any) -> None:
-    mailbox = Mailbox(PLAN, "test", replay=False)
-    with PageServer(mailbox, LOCAL) as server:
+    with served() as (server, mailbox):
         mailbox.publish(scene())
         page = looking(browser, server.url, "dark")
         rates_hz = [frame_rate(page, mailbox) for _ in range(5)]

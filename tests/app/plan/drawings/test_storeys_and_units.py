@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ezdxf.filemanagement import readfile
 
+from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep_app.commands.options import scale_of as scale_option
 from echostep_app.plan.importers.dxf.frame import METRES
@@ -47,6 +48,13 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
     assert [[room.name for room in level.rooms] for level in plan.levels] == [["Hall"], ["Loft"]]
     assert plan.levels[0].doors[0].line == pytest.approx((4.05, 3.0, 4.05, 3.9), abs=0.01)
     assert plan.levels[1].doors[0].line == pytest.approx((4.05, 5.0, 4.05, 5.9), abs=0.05)
+
+
+def test_rows_of_rooms_that_doors_join_are_one_storey() -> None:
+    """The office of the manual's pictures: nothing but the doors at both ends of its corridor joins the rows."""
+    report = ImportReport()
+    (level,) = import_plan(ROOT / "tests/captures/office.dxf", report=report).levels
+    assert (report.doubts, len(level.rooms), len(level.doors)) == ([], 12, 14)
 
 
 def test_a_window_without_walls_is_refused(tmp_path: Path) -> None:

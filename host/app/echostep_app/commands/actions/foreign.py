@@ -7,6 +7,7 @@ In: a path. Out: one sentence; "" for an MCAP file. Owns nothing. The first byte
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from echostep.errors import EchostepError, replaced
@@ -15,6 +16,7 @@ from echostep.offline.csv_table import LONGEST_LINE, UTF_16, header_of
 from echostep.ports.chunks import BOARD
 from echostep.recording import MCAP_MAGIC, SUFFIX, port_of_bytes
 from echostep_app.offline import leg_csv
+from echostep_app.offline.foreign_columns import read_header
 from echostep_app.printing.lines import as_error
 
 HEAD = 1 << 16  # bytes that are looked at
@@ -85,8 +87,11 @@ def _of_text(head: bytes) -> str:
         return "bytes of an unknown kind: neither frames of a board or an MT, nor a text"
     if text.lstrip().startswith(("{", "[", "<")):
         return f"{'JSON' if text.lstrip()[0] != '<' else 'XML'}: where it is a plan, echostep plan check FILE or echostep plan import FILE reads it"
-    names, _ = header_of(text.splitlines()[0][:LONGEST_LINE])
+    lines = text.splitlines(keepends=True)
+    names, _ = header_of(lines[0][:LONGEST_LINE])
     small = {name.casefold() for name in names}
+    with suppress(ValueError, EchostepError):  # of a program whose names `import` knows
+        small |= set(read_header(iter(lines)).names)
     for columns, said in TABLES.items():
         if small.issuperset(columns):
             return f"a table with {said}"

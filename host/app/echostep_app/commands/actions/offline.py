@@ -19,6 +19,7 @@ from echostep.offline.imu_csv import Imu, describe_track, own_track, write_foot_
 from echostep.recording import Decoder, as_json, read_capture
 from echostep.xsens.message import MessageReader
 from echostep.xsens.output_formats import OutputFormats
+from echostep_app.kernel_parts import FOOT, PREPARING, compile_parts
 from echostep_app.offline.floors.floor_table import describe, find_levels, parse_heights, write_floors
 from echostep_app.offline.floors.floors import record_floors
 from echostep_app.offline.floors.pressure_csv import load_pressures
@@ -40,6 +41,7 @@ from echostep_app.output.offline_plots import draw_floors, draw_foot, draw_legs
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import complain
 from echostep_app.printing.people import is_unread
+from echostep_app.printing.progress import progress_line
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.names import link_newest, new_name
 from echostep_app.scorecard.truth import load_truth, truth_field
@@ -97,6 +99,8 @@ def foot(path: Path, out: Path, profile: str, picture: Path | None, naming: Nami
     """Track a recorded foot IMU with this project's method or a paper's."""
     track_recording = method("foot", profile, own_track)
     imu = _told(path, naming)
+    with progress_line(PREPARING.capitalize()) as show:
+        compile_parts([FOOT], show)
     track = track_recording(imu, path.name)
     refuse_glide(imu, track, path.name)
     write_foot_track(out, track)

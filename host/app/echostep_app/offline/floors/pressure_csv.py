@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints
-from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples, rate_complaint
+from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples
+from echostep.ports.imu_samples import rate_complaint
 from echostep_app.offline.foreign_columns import ADVICE, OWN, UNITS, Naming, read_header
 
 COLUMNS = ("t_s", "pressure_pa")

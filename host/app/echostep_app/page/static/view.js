@@ -3,6 +3,7 @@
 
 const ABOUT_M = 15, MUCH_NEARER = 1.25;  // of the wearer in the first view; than the whole floor, if it is to be shown; assumed
 const SIGN_PX = 24;
+const BESIDE_PX = 40, ABOVE_PX = 16;  // margins of a plan: its exits' signs reach so far beyond it (AUSGANG); assumed
 const LEAST_FREE = 0.05;  // share of the map; less is as good as nothing
 
 export class View {
@@ -88,8 +89,7 @@ export class View {
   // A box of the map fills the free part.
   fit([x0, y0, x1, y1]) {
     const [l, t, r, b] = this.free, c = Math.abs(Math.cos(this.turn)), s = Math.abs(Math.sin(this.turn)), w = x1 - x0, h = y1 - y0;
-    const margin = 16;
-    this.scale = Math.min((r - l - 2 * margin) / Math.max(c * w + s * h, 1), (b - t - 2 * margin) / Math.max(s * w + c * h, 1));
+    this.scale = Math.min((r - l - 2 * BESIDE_PX) / Math.max(c * w + s * h, 1), (b - t - 2 * ABOVE_PX) / Math.max(s * w + c * h, 1));
     this.scale = Math.min(Math.max(this.scale, 0.02), 80);
     this.centre((x0 + x1) / 2, (y0 + y1) / 2);
   }

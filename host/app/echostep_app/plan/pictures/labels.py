@@ -83,9 +83,12 @@ def draw_labels(axes: Any, labels: Sequence[Label]) -> int:
 
 def _draw(axes: Any, label: Label, taken: list[Floats]) -> bool:
     """Draw one label at its first size and offset that covers none of the boxes `taken`; adds its own box."""
+    from matplotlib.patheffects import withStroke
+
     drawn = axes.annotate(
         label.text, label.position_m, (0.0, 0.0), textcoords="offset points", size=label.size_pt, color=label.colour,
         parse_math=False, annotation_clip=True, clip_on=True, zorder=8, ha="center", va="center",
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],  # legible over lines
     )  # fmt: skip
     pixels_pt = axes.figure.dpi / 72.0
     anchor = axes.transData.transform(label.position_m)

@@ -20,7 +20,7 @@ from echostep.recording import open_parts
 from echostep.tracker import Tracker
 from echostep.walk.recorded import shown_name
 from echostep_app.interruption import is_asked, until_asked
-from echostep_app.kernel_parts import LATER, TRACKING, compile_parts
+from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, compile_parts
 from echostep_app.page.elements.scene import PageScene
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
@@ -37,7 +37,6 @@ from echostep_app.session.session import open_browser
 
 DEMO_PLAN = Path(str(files("echostep"))) / "plans" / "demo.json"
 WAITING = "drop a recording and its plan here"
-PREPARING = "preparing; the first time on a computer this takes about a minute"
 POLL_S = 0.2
 
 
@@ -109,10 +108,16 @@ def serve_drops(address: Address, *, browser: bool) -> None:
             open_browser(server.url)
         drop = _next(files, server)
         while True:
-            server.show(_waiting(PREPARING))
-            compile_parts([*TRACKING, *LATER])
-            drop.tracker.warm_up()
+            _prepare(drop.tracker, server)
             drop = _play(drop, files, server)
+
+
+def _prepare(tracker: Tracker, server: PageServer) -> None:
+    """Compile missing kernels; the page shows the share."""
+    mailbox = _waiting(PREPARING)
+    server.show(mailbox)
+    compile_parts([*TRACKING, *LATER], lambda share: mailbox.show(_says(f"{PREPARING}: {share:.0%}")))
+    tracker.warm_up()
 
 
 def _play(drop: Drop, files: DroppedFiles, server: PageServer) -> Drop:
@@ -156,5 +161,9 @@ def _remove(path: Path) -> None:
 def _waiting(words: str) -> Mailbox:
     """What the page shows while nothing is played."""
     mailbox = Mailbox(NO_PLAN, "echostep page", replay=False)
-    mailbox.publish(PageScene(0, 0.0, None, None, (), None, 0, words))
+    mailbox.publish(_says(words))
     return mailbox
+
+
+def _says(words: str) -> PageScene:
+    return PageScene(0, 0.0, None, None, (), None, 0, words)

@@ -160,7 +160,7 @@ def _lay_over(storeys: list[_Storey], hints: Hints, report: ImportReport) -> Non
             raise EchostepError(f"{storey.sheet.file}: the layers of walls have no lines: give --layer walls=NAME")
         if storey.window is not None:
             continue
-        if len(boxes := storey_boxes(lines)) > 1:
+        if len(boxes := storey_boxes([*lines, *storey.lines("doors")])) > 1:  # a door joins the walls beside it
             report.doubt(
                 f"{storey.sheet.file.name} looks like {len(boxes)} storeys beside each other: import them as levels with "
                 + _windows(storey, boxes)
