@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import logging
 import sys
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
-from echostep.errors import EchostepError, IncompleteError, words_of
+from echostep.errors import INSTEAD, EchostepError, IncompleteError, has_left, words_of
 from echostep.file_mode import share_files
-from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
-from echostep_app.commands.former import former_use
+from echostep_app.commands import files, hardware, plan, recordings, runs
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
@@ -35,11 +35,11 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Indoor pedestrian tracking.",
 )
-for nameless in (runs, files, commander, hardware, recordings):
+for nameless in (runs, files, hardware, recordings):
     app.add_typer(nameless.app)
 add_studies(app)
-for name, group in {"beacons": beacons, "plan": plan}.items():
-    app.add_typer(group.app, name=name)
+app.add_typer(hardware.beacons_app, name="beacons")
+app.add_typer(plan.app, name="plan")
 
 
 def _print_version(wanted: bool) -> None:
@@ -104,3 +104,17 @@ def _status() -> int:
             raise
         return 130
     return 0
+
+
+def former_use(words: Sequence[str]) -> str:
+    """The sentence about the first former use in the words of a command line, without the program's name; empty where there is none."""
+    given = (word.replace("=", " ", 1) if word.startswith("--") else word for word in words if word != "--share")
+    line = f" {' '.join(given)} "
+    return next((has_left(use) for use in INSTEAD if _is_used(use, line)), "")
+
+
+def _is_used(use: str, line: str) -> bool:
+    if use.endswith((":", "/")):
+        return f" {use}" in line
+    command, _, option = use.partition(" --")
+    return line.startswith(f" {command} ") and (not option or f" --{option} " in line)
