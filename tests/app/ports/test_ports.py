@@ -18,8 +18,8 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
+from echostep_app.ports.access import port_of_number, usb_number
 from echostep_app.ports.serial_ports import ChunkQueue, SerialPorts
-from echostep_app.ports.usb_number import port_of_number, usb_number
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.runs import live
 from players import pseudo_terminal
