@@ -31,7 +31,7 @@ from echostep.offline.imu_checks import NEEDED
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
 from echostep_app.offline.foreign_columns import OWN, Naming, read_header
-from echostep_app.printing.lines import as_error
+from echostep_app.printing.lines import as_error, faults_of
 
 SESSIONS = ("inertial", "sensors", "raw data")  # files of one session that have both sensors: x-IMU3, NGIMU, phyphox
 MAT_IMU, MAT_TIME = ("imu_data", "imu"), ("timestamps_all", "timestamps", "ts", "t_s")
@@ -51,11 +51,9 @@ def load_foot(path: Path, naming: Naming = OWN) -> Imu:
     with as_error(f"{path}: cannot read the samples"):
         if path.stat().st_size > MOST_BYTES:
             raise EchostepError(f"{path}: larger than {MOST_BYTES >> 30} GB: cut the recording into parts")
-    try:
+    with faults_of(path):
         table, notes = reader(path)
         return imu_of(np.where(np.abs(table) <= GREATEST, table, np.nan), notes)
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
 
 
 def _zip(path: Path, naming: Naming) -> Imu:
@@ -101,10 +99,8 @@ def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
         notes.append("an iPhone's, not standardised: the signs of its accelerations are changed")
     elif "gravity" in notes[-1] and not system:
         notes.append("read as of Android; of an iPhone, not standardised, the track is mirrored: add its Metadata.csv")
-    try:
+    with faults_of(path):
         return imu_of(np.column_stack([gyro[:, 0], accel, gyro[:, 1:]]), tuple(notes))
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
 
 
 def _system(metadata: Path | None) -> str:
