@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from echostep.plan import Plan
-from echostep_app.plan.places.refusals import refusals
+from echostep_app.plan.places.findings import refusals
 from localization.test_drawn_places import ROOM, drawing
 
 
