@@ -12,8 +12,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import serial
 from serial.tools import list_ports
 
+try:
+    from termios import error as _terminal_error  # not an OSError; pyserial passes it on when a port goes away
+except ImportError:  # Windows has no termios
+    _terminal_error = OSError  # type: ignore[misc, assignment]
+
+PORT_FAULTS = (serial.SerialException, OSError, ValueError, NotImplementedError, _terminal_error)
+"""ValueError: a setting or a URL that pyserial refuses. NotImplementedError: a setting that a kind of URL lacks."""
 LONGEST_COMMAND = 60  # characters that are shown of a command
 # Services of Linux that open ports of others, by the name of their process, and how to end that.
 TAKERS = {
