@@ -12,14 +12,15 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from importlib.metadata import entry_points
+from typing import Annotated, Any, NoReturn
 
 import typer
+import typer.core
 
 from echostep.errors import INSTEAD, EchostepError, IncompleteError, has_left, words_of
 from echostep.file_mode import share_files
 from echostep_app.commands import files, hardware, plan, recordings, runs
-from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
 from echostep_app.printing.compiling import tell_of_compiling
@@ -27,6 +28,23 @@ from echostep_app.printing.lines import complain, say
 from echostep_app.printing.people import lost_result, to_people
 
 LOST_KERNEL = "no compiled object"  # numba's words where a signal's exception was dropped in a callback of LLVM, while a kernel was compiled
+STUDIES = "echostep_app.commands"  # entry points of the commands of the studies, a distribution of their own
+MISSING = "The studies are a package of their own: pip install echostep-studies."
+
+
+class _Missing(typer.core.TyperGroup):
+    """A group of commands that are not there: any name of one raises EchostepError."""
+
+    def get_command(self, *_: Any) -> NoReturn:
+        raise EchostepError(f"{self.name}: {MISSING}")
+
+
+def add_studies(to: typer.Typer) -> None:
+    """Add the commands of `echostep-studies`; without it, a group of which each raises EchostepError."""
+    missing = typer.Typer(cls=_Missing, no_args_is_help=True, help=MISSING, callback=lambda: None)
+    studies = {entry.name: entry.load() for entry in entry_points(group=STUDIES)}
+    to.add_typer(studies.get("evaluate", missing), name="evaluate")
+
 
 app = typer.Typer(
     add_completion=False,
