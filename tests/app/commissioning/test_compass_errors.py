@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Iron about a compass, found by a turn on the spot."""
+"""Iron about a compass, found by a turn on the spot; bearings of a magnetometer of three axes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ import math
 import numpy as np
 import pytest
 
+from board.test_tilt_compass import shaken
+from echostep.board import messages as m
+from echostep.board.frames import BoardReader
 from echostep.legs.heading import CompassErrors
-from echostep_app.commissioning.fitting import fit_compass_errors
+from echostep_app.commissioning.fitting import bearings, fit_compass_errors
+from echostep_app.commissioning.probe import ProbeResult
 
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))
 
@@ -39,3 +43,14 @@ def test_half_a_turn_is_refused_in_words() -> None:
         fit_compass_errors(t, np.full_like(t, 0.9), np.full_like(t, 1.0))
     with pytest.raises(ValueError, match="fewer than 20"):
         fit_compass_errors(t, np.full_like(t, 0.9), np.full_like(t, np.nan))
+
+
+def test_calibrate_takes_the_bearings_of_a_magnetometer() -> None:
+    probed = ProbeResult()
+    for message in BoardReader().feed(shaken(2, 1.1)):
+        assert isinstance(message, m.Motion | m.Magnetic)
+        probed.axes.append(message)
+        probed.ticks.setdefault(type(message).__name__, []).append(message.ticks)
+    t_s, found = bearings(probed)
+    assert len(t_s) == len(found) == 50
+    assert np.degrees(np.abs(found[20:] - (0.5 * math.pi - 1.1))).max() < 2.0
