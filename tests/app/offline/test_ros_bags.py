@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,12 @@ def walk() -> np.ndarray:
     return np.column_stack([t_s, accel, gyro])
 
 
-def bag(path: Path, rows: Rows, storage: Any = STORAGES[0], frame: str = "foot", begin_s: int = BEGIN_S) -> Path:
-    """A bag of these topics; the stamps begin at `begin_s`, all of them 0 without."""
+def bag(path: Path, rows: Rows, storage: Any = STORAGES[0], frames: str = "foot", begin_s: int = BEGIN_S) -> Path:
+    """A bag of these topics; `frames`: one after the other, that of a sensor without rates: ?; the stamps begin at `begin_s`, without all are 0."""
     store = get_typestore(storage[1])
-    vector, zeros = store.types["geometry_msgs/msg/Vector3"], np.zeros(9)
-    turn = store.types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    types: Any = store.types
+    vector, zeros = types["geometry_msgs/msg/Vector3"], np.zeros(9) - ("?" in frames)
+    turn = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
     variance = (0.0,) * (storage[1] is Stores.ROS2_JAZZY)
     values = {
         "Imu": lambda v: (turn, zeros, vector(*v[3:]), zeros, vector(*v[:3]), zeros),
@@ -48,10 +50,10 @@ def bag(path: Path, rows: Rows, storage: Any = STORAGES[0], frame: str = "foot",
     with Writer(path, version=9, storage_plugin=storage[0]) as writer:
         for (topic, kind), table in rows.items():
             connection = writer.add_connection(topic, TYPE + kind, typestore=store)
-            for t_s, *v in table.tolist():
+            for (t_s, *v), frame in zip(table.tolist(), cycle(frames.split()), strict=False):
                 nanoseconds = round(1e9 * t_s) + 10**9 * begin_s if begin_s else 0
-                time = store.types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
-                message = store.types[TYPE + kind](store.types["std_msgs/msg/Header"](time, frame), *values[kind](v))
+                time = types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
+                message = types[TYPE + kind](types["std_msgs/msg/Header"](time, frame), *values[kind](v))
                 writer.write(connection, 10**9 + round(1e9 * t_s), store.serialize_cdr(message, TYPE + kind))
     return path
 
@@ -106,8 +108,10 @@ def test_samples_of_no_sensor_are_refused(walk: np.ndarray, tmp_path: Path) -> N
     rows = {("/imu", "Imu"): walk[:200]}
     assert "/imu: the stamps of its headers are zero" in refused(bag(tmp_path / "a", rows, begin_s=0))
     assert "/imu: turned into the frame map: samples in the sensor's own" in refused(
-        bag(tmp_path / "b", rows, frame="map")
+        bag(tmp_path / "b", rows, frames="map")
     )
+    assert "/imu: frames chest, foot: one sensor" in refused(bag(tmp_path / "c", rows, frames="foot chest"))
+    assert "/imu: no rates or no forces (covariance -1)" in refused(bag(tmp_path / "d", rows, frames="?"))
 
 
 @pytest.mark.parametrize("storage", STORAGES[::2])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from gaitmap.base import BaseTrajectoryMethod  # type: ignore[import-not-found]
+from gaitmap.base import BaseTrajectoryMethod
 from pandas import DataFrame, Index
 from scipy.spatial.transform import Rotation
 
@@ -28,21 +28,18 @@ class FootNavigation(BaseTrajectoryMethod):  # type: ignore[misc]
         self.initial_orientation = initial_orientation
 
     def estimate(self, data: DataFrame, *, sampling_rate_hz: float, **_strides: Any) -> Self:
-        """Compute position_ (m), velocity_ (m/s) and orientation_ from n samples, n + 1 rows each. Raises ValueError without a rest, EchostepError
-        for other units.
-        """
+        """Compute position_ (m), velocity_ (m/s), orientation_, n + 1 rows each. Raises ValueError without a rest, EchostepError for other units."""
         self.data, self.sampling_rate_hz = data, sampling_rate_hz
-        t_s = np.arange(len(data)) / sampling_rate_hz
-        accel, degrees = (data[[f"{name}_{axis}" for axis in "xyz"]].to_numpy() for name in ("acc", "gyr"))
-        check_samples(t_s, accel, np.radians(degrees))
-        rows = _navigated(t_s, accel, np.radians(degrees))
+        t_s, accel = np.arange(len(data)) / sampling_rate_hz, data[["acc_x", "acc_y", "acc_z"]].to_numpy()
+        gyro = np.radians(data[["gyr_x", "gyr_y", "gyr_z"]].to_numpy())
+        check_samples(t_s, accel, gyro)
+        rows = _navigated(t_s, accel, gyro)
         turned = Rotation.from_quat(rows[:, 6:], scalar_first=True)
         about_z = self._first_turn(turned[0])
         self.orientation_object_ = about_z * turned
-        for k, name in enumerate(("position", "velocity")):
-            columns = [f"{name[:3]}_{axis}" for axis in "xyz"]
-            values = about_z.apply(rows[:, 3 * k : 3 * k + 3])
-            setattr(self, f"{name}_", DataFrame(values, Index(range(len(rows)), name="sample"), columns))
+        index, position, velocity = Index(range(len(rows)), name="sample"), rows[:, :3], rows[:, 3:6]
+        self.position_ = DataFrame(about_z.apply(position), index, ["pos_x", "pos_y", "pos_z"])
+        self.velocity_ = DataFrame(about_z.apply(velocity), index, ["vel_x", "vel_y", "vel_z"])
         return self
 
     def _first_turn(self, levelled: Rotation) -> Rotation:

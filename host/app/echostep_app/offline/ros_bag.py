@@ -25,7 +25,6 @@ from echostep_app.printing.lines import faults_of
 TOPICS = ("imu", "pressure", "left", "right")  # what --columns calls a topic
 SIDES = TOPICS[2:]  # of ranges
 FIXED = {"earth", "map", "odom", "world"}  # frames in which no sensor measures
-Table = tuple[Floats, tuple[str, ...]]  # rows, notes
 
 
 class Kind(NamedTuple):
@@ -58,42 +57,44 @@ def is_bag(path: Path) -> bool:
     return path.suffix.lower() in (".db3", ".mcap") or (path / "metadata.yaml").is_file()
 
 
-def read_bag(path: Path, kind: Kind, name: str, naming: Naming) -> Table:
-    """Rows (n, k) of the topic that --columns `name`=TOPIC states; else of the only one of this kind, for a side with it in its name."""
+def read_bag(path: Path, kind: Kind, name: str, naming: Naming) -> tuple[Floats, tuple[str, ...]]:
+    """Rows (n, k) and notes of the topic that --columns `name`=TOPIC states; else of the only one of this kind, for a side with it in its name."""
     require("a bag of ROS 2", "rosbags")
     with faults_of(path):
         if unknown := naming.columns.keys() - set(TOPICS):
             raise ValueError(f"--columns {min(unknown)}: a bag has no columns; {', '.join(TOPICS)} are names of topics")
         try:
-            topics, read = _messages(path, kind)
+            types, read = _messages(path, kind)
         except Exception as error:  # whatever rosbags and SQLite make of a damaged bag
-            raise ValueError(
-                f"no bag of ROS 2 that can be read: {error}; of a damaged one ros2 bag reindex or mcap recover may save the rest"
-            ) from error
+            remedy = "of a damaged one ros2 bag reindex or mcap recover may save the rest"
+            raise ValueError(f"no bag of ROS 2 that can be read: {error}; {remedy}") from error
         asked = naming.columns.get(name)
         fit = [topic for topic in read if (topic == asked if asked else name not in SIDES or name in topic)]
         if len(fit) != 1:
             found = f"{len(fit)} topics" if fit else "no messages"
-            there = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))[:300] or "none"
+            there = ", ".join(f"{topic} ({type_})" for topic, type_ in sorted(types.items()))[:300] or "none"
             raise ValueError(f"{found} of {kind.type} for {name}: say --columns {name}=TOPIC; there are {there}")
-        return _checked(fit[0], kind, *zip(*read[fit[0]], strict=True), naming)
+        frames, rows = zip(*read[fit[0]], strict=True)
+        table = np.array(rows)
+        if wrong := _complaint(frames, table, kind):
+            raise ValueError(f"{fit[0]}: {wrong}")
+        factors = factors_of(list(kind.columns), list(kind.columns), naming.units)
+        return table * [factors.get(column, 1.0) for column in kind.columns], (f"read from {fit[0]}, a message a line",)
 
 
-def _checked(topic: str, kind: Kind, frames: tuple[str, ...], rows: tuple[list[float], ...], naming: Naming) -> Table:
-    """The rows of a topic in SI; raises ValueError for those of no sensor."""
-    if len(rows) > (LIMITS.lines or 0):
-        raise ValueError(f"more than {LIMITS.lines} messages: cut the recording into parts")
-    if len(several := sorted(set(frames))) > 1:
-        raise ValueError(f"{topic}: frames {', '.join(several)[:300]}: one sensor a topic is read")
-    if kind is IMU and frames[0].strip("/") in FIXED:
-        raise ValueError(f"{topic}: turned into the frame {frames[0]}: samples in the sensor's own frame are needed")
-    table = np.array(rows)
+def _complaint(frames: tuple[str, ...], table: Floats, kind: Kind) -> str:
+    """Why the rows of a topic are not those of one sensor; empty when they are."""
+    several = sorted(set(frames))
+    if len(table) > (LIMITS.lines or 0):
+        return f"more than {LIMITS.lines} messages: cut the recording into parts"
+    if len(several) > 1:
+        return f"frames {', '.join(several)[:300]}: one sensor a topic is read"
+    if kind is IMU and several[0].strip("/") in FIXED:
+        return f"turned into the frame {several[0]}: samples in the sensor's own frame are needed"
     if np.isnan(table[:, 0]).all():
-        raise ValueError(f"{topic}: the stamps of its headers are zero: let the driver stamp the samples")
-    if kind is IMU and np.isnan(table[:, 1:]).all():
-        raise ValueError(f"{topic}: no rates or no forces (covariance -1): record both")
-    factors = factors_of(list(kind.columns), list(kind.columns), naming.units)
-    return table * [factors.get(column, 1.0) for column in kind.columns], (f"read from {topic}, a message a line",)
+        return "the stamps of its headers are zero: let the driver stamp the samples"
+    no_rates = kind is IMU and np.isnan(table[:, 1:]).all()
+    return "no rates or no forces (covariance -1): record both" if no_rates else ""
 
 
 def _messages(path: Path, kind: Kind) -> tuple[dict[str, str], dict[str, list[tuple[str, list[float]]]]]:
