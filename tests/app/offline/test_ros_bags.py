@@ -41,7 +41,7 @@ def bag(path: Path, rows: Rows, storage: Any = STORAGES[0], frames: str = "foot"
     vector, zeros = types["geometry_msgs/msg/Vector3"], np.zeros(9) - ("?" in frames)
     turn = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
     variance = (0.0,) * (storage[1] is Stores.ROS2_JAZZY)
-    values = {
+    values: dict[str, Any] = {
         "Imu": lambda v: (turn, zeros, vector(*v[3:]), zeros, vector(*v[:3]), zeros),
         "FluidPressure": lambda v: (v[0], 0.0),
         "Range": lambda v: (0, 0.1, 0.2, 6.0, v[0], *variance),
