@@ -19,7 +19,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 @pytest.fixture(autouse=True)
 def computer_of_one_user(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever accounts this computer has: they would put a token into the addresses of pages."""
-    monkeypatch.setattr("echostep_app.page.web.users.has_other_users", lambda: False)
+    monkeypatch.setattr("echostep_app.page.web.access.has_other_users", lambda: False)
 
 
 @pytest.fixture(autouse=True)

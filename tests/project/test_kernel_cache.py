@@ -17,8 +17,18 @@ from echostep import kernel_cache
 from echostep.errors import EchostepError
 from echostep.jit import DAMAGED, CheckedFiles
 from echostep.kernel_cache import PACKAGE, cache_folder
-from users import ANOTHER_USER, AS_ANOTHER_USER, needs_another_user
 from waiting import PATIENCE_S, ran
+
+ANOTHER_USER = 1234  # a number that no account of a computer need have
+AS_ANOTHER_USER = (
+    *("setpriv", f"--reuid={ANOTHER_USER}", f"--regid={ANOTHER_USER}", "--clear-groups"),
+    *("--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"),
+)
+needs_another_user = pytest.mark.skipif(
+    os.geteuid() != 0 or shutil.which("setpriv") is None,
+    reason="only root can be another user for the length of a test",
+)
+
 
 SHAPES = """
 from typing import NamedTuple

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The guided returns of [Fischer 2008, 4]: magnetic sources, measurements, the paper's fusion, intervals, the success of each system."""
+"""The guided returns of [Fischer 2008, 4]: magnetic sources, measurements, the paper's fusion, intervals, each system's success, resampling."""
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import os
@@ -11,9 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from command_line import echostep
+from echostep.beacons.model import BeaconSettings
 from echostep_simulation.world.beacon_ground import OUTLIER_M, disturbance, ground, is_in_reach, measure
+from echostep_studies.fischer2008.beacon_cloud import new_cloud, resample_beliefs
 from echostep_studies.fischer2008.paper_fusion import FUSION, fuse
 from echostep_studies.fischer2008.simulator import OURS, PAPER, PDR, guided_return
 from echostep_studies.fischer2008.study import NOMINAL, UNCERTAIN, Case, cases, one_return, wilson95
@@ -113,3 +118,16 @@ def test_command_writes_rows_and_a_picture(tmp_path: Path) -> None:
     assert all(set(row) == {"name", "success", "low95", "high95", "runs"} for row in rows)
     assert all(0.0 <= row["low95"] <= row["success"] <= row["high95"] <= 1.0 for row in rows)
     assert (tmp_path / "out" / "sweeps.png").stat().st_size > 10_000
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_beliefs_are_those_of_the_chosen(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    chosen = np.sort(rng.integers(0, n, n))
+    beliefs = new_cloud(n, 2, 0.0, 0.0, BeaconSettings(), rng).beacons.beliefs
+    for part in beliefs:
+        part[:] = rng.standard_normal(part.shape)
+    before = copy.deepcopy(beliefs)
+    resample_beliefs(beliefs, chosen)
+    for part, old in zip(beliefs, before, strict=True):
+        assert (part == old[chosen]).all()

@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""The study of legs, once: the foot in all manners of moving, one leg where it shows something and where it does not, the lap of the paper."""
+"""The study of legs, once: the foot in all manners of moving, one leg where it shows something and where it does not, the paper's lap."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from echostep.errors import EchostepError
+from echostep.legs.kinematics import LegLengths
+from echostep.legs.stride import Flag
 from echostep_studies.frame.study import StudyRequest
 from echostep_studies.legs import feet as feet_part
 from echostep_studies.legs import manners as manners_part
 from echostep_studies.legs.feet import STEPS, FootRun, foot_rows
 from echostep_studies.legs.manners import MannerRun, manner_rows
 from echostep_studies.legs.study import legs_study
+from echostep_studies.simulation.joint_gait import FAST, NATURAL, SLOW, WalkingPace, draw_person, simulate_gait
+from legs.leg_walks import strides_of, total_m
 
 ROUGH = {"foot/running": 2.0, "foot/crawling": 2.0}  # percent of the way; else 0.5
 STAIRS = ("legs/upstairs", "legs/downstairs")
@@ -84,3 +89,23 @@ def test_the_lap_of_the_paper_by_its_method_and_by_ours() -> None:
     assert list(rows) == ["lap/lee2010", "lap/default", "lap/default+plan"]
     assert 8.0 > rows["lap/lee2010"].ending_m > rows["lap/default"].ending_m > rows["lap/default+plan"].ending_m
     assert abs(rows["lap/lee2010"].distance_error_percent) < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("manner", "seconds", "mean", "flag"),
+    [(SLOW, 6.0, 0.04, Flag.SLOW), (NATURAL, 4.0, 0.04, Flag.NONE), (FAST, 3.0, 0.04, Flag.FAST)],
+)
+def test_people_by_their_joint_curves(manner: WalkingPace, seconds: float, mean: float, flag: Flag) -> None:
+    errors, flags = [], []
+    for seed in range(16):
+        rng = np.random.default_rng(seed)
+        person = draw_person(rng)
+        gait = simulate_gait(person, manner, seconds, rng)
+        strides = strides_of(
+            gait.t_s, gait.thigh_rad_s, -gait.shank_rad_s, LegLengths(person.leg.thigh_m, person.leg.shank_m)
+        )
+        errors.append(total_m(strides) / float(gait.way_m[-1]) - 1.0)
+        flags += [s.flags for s in strides if s.length_m > 0.5 and Flag.EDGE not in s.flags]
+    assert np.abs(errors).mean() < mean
+    assert sum(flag in f if flag else not f for f in flags) > 0.5 * len(flags)

@@ -11,22 +11,40 @@ from __future__ import annotations
 
 import logging
 import sys
-from typing import Annotated
+from collections.abc import Sequence
+from importlib.metadata import entry_points
+from typing import Annotated, Any, NoReturn
 
 import typer
+import typer.core
 
-from echostep.errors import EchostepError, IncompleteError, words_of
+from echostep.errors import INSTEAD, EchostepError, IncompleteError, has_left, words_of
 from echostep.file_mode import share_files
 from echostep.kernel_cache import on_compiling
-from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
-from echostep_app.commands.former import former_use
-from echostep_app.commands.studies import add_studies
+from echostep_app.commands import files, hardware, plan, recordings, runs
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
 from echostep_app.printing.lines import complain, say
 from echostep_app.printing.people import lost_result, to_people
 
 LOST_KERNEL = "no compiled object"  # numba's words where a signal's exception was dropped in a callback of LLVM, while a kernel was compiled
+STUDIES = "echostep_app.commands"  # entry points of the commands of the studies, a distribution of their own
+MISSING = "The studies are a package of their own: pip install echostep-studies."
+
+
+class _Missing(typer.core.TyperGroup):
+    """A group of commands that are not there: any name of one raises EchostepError."""
+
+    def get_command(self, *_: Any) -> NoReturn:
+        raise EchostepError(f"{self.name}: {MISSING}")
+
+
+def add_studies(to: typer.Typer) -> None:
+    """Add the commands of `echostep-studies`; without it, a group of which each raises EchostepError."""
+    missing = typer.Typer(cls=_Missing, no_args_is_help=True, help=MISSING, callback=lambda: None)
+    studies = {entry.name: entry.load() for entry in entry_points(group=STUDIES)}
+    to.add_typer(studies.get("evaluate", missing), name="evaluate")
+
 
 app = typer.Typer(
     add_completion=False,
@@ -35,11 +53,11 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Indoor pedestrian tracking.",
 )
-for nameless in (runs, files, commander, hardware, recordings):
+for nameless in (runs, files, hardware, recordings):
     app.add_typer(nameless.app)
 add_studies(app)
-for name, group in {"beacons": beacons, "plan": plan}.items():
-    app.add_typer(group.app, name=name)
+app.add_typer(hardware.beacons_app, name="beacons")
+app.add_typer(plan.app, name="plan")
 
 
 def _print_version(wanted: bool) -> None:
@@ -111,3 +129,17 @@ def _status() -> int:
             raise
         return 130
     return 0
+
+
+def former_use(words: Sequence[str]) -> str:
+    """The sentence about the first former use in the words of a command line, without the program's name; empty where there is none."""
+    given = (word.replace("=", " ", 1) if word.startswith("--") else word for word in words if word != "--share")
+    line = f" {' '.join(given)} "
+    return next((has_left(use) for use in INSTEAD if _is_used(use, line)), "")
+
+
+def _is_used(use: str, line: str) -> bool:
+    if use.endswith((":", "/")):
+        return f" {use}" in line
+    command, _, option = use.partition(" --")
+    return line.startswith(f" {command} ") and (not option or f" --{option} " in line)

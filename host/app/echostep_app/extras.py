@@ -23,6 +23,7 @@ EXTRAS = dict.fromkeys((*PAGE, "segno"), "page") | {
     "pyarrow": "parquet",
     "pandas": "pandas",
     "ifcopenshell": "ifc",
+    "rosbags": "ros",
     "foxglove": "foxglove",
 }
 

@@ -51,6 +51,7 @@ INSTEAD: dict[str, str] = {
     "map --plan": "a walk is drawn by itself; echostep plan edit mends a plan",
     "--plan wearer:": "echostep map WALK.mcap -o plan.json draws that wearer's recording, and --plan plan.json takes it",
     "mesh://": "reports go by IP to the team's broker (mqtt://HOST); what a Meshtastic radio's own uplink brings there: docs/teams.md, Off grid",
+    "score --setup": "a time that is given is not measured: note it beside the scores",
     "score --html": "score prints the numbers, and evo draws the track that export writes as .tum",
 }
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Mode of the files of a run: readable by its user alone, unless `--share` was given.
 
-In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
+In: a path that is about to be written; a table. Out: a file of mode 0600 there. Owns the answer to `--share`.
 
 A recording shows where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation
 read, are written meanwhile.
@@ -9,8 +9,10 @@ read, are written meanwhile.
 
 from __future__ import annotations
 
+import csv
 import os
-from itertools import count
+from collections.abc import Iterable, Sequence
+from itertools import chain, count
 from pathlib import Path
 
 PRIVATE, SHARED = 0o600, 0o666  # of a new file; the umask may take away more
@@ -40,3 +42,9 @@ def keep_earlier(path: Path) -> Path:
         names = (path.with_stem(f"{path.stem}-{number:04}") for number in count(1))
         path.rename(next(name for name in names if not os.path.lexists(name)))
     return path
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write the names of the columns, then the rows, into a file that is claimed. Raises OSError."""
+    with claim(path).open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows(chain([columns], rows))

@@ -14,7 +14,7 @@ from echostep.plan import load_plan
 from echostep.recording import open_parts
 from echostep.settings import Settings, parse_settings
 from echostep.walk.recorded import tracker_of
-from echostep_app.commands.former import former_use
+from echostep_app.cli import former_use
 from echostep_app.recording.recorder import Recorder
 from walks import DEMO, walk_chunks
 

@@ -20,9 +20,8 @@ from echostep.path import MeasuredSegment, PathSegment
 from echostep.plan import NO_PLAN
 from echostep.tracker import Tracker
 from echostep_app.guidance.cues import Cue, CueKind
-from echostep_app.guidance.guided_return import GuidedReturn
+from echostep_app.guidance.guided_return import JOIN_M, STEP_M, GuidedReturn, OwnWay
 from echostep_app.guidance.guided_run import guidance_of
-from echostep_app.guidance.own_way import JOIN_M, STEP_M, OwnWay
 from echostep_app.plan.polyline import way_m
 
 MEASURED = MeasuredSegment(PathSegment(0.0, 1.0, 0.4, 0.0, 0.0, 0.0, 0.02, 0.0, 1), *np.empty((3, 0)))

@@ -22,7 +22,7 @@ from typing import Self
 
 from echostep_app.page.elements.guidance import ShownGuidance
 from echostep_app.page.mailbox import Mailbox, popped
-from echostep_app.page.web import users
+from echostep_app.page.web import access
 from echostep_app.plan.routing import Goal
 from operation.teams import ServedTeam, Team, whole_team
 from page.frames import PLAN, scene, served
@@ -34,7 +34,7 @@ WAY = ShownGuidance("walk", "Straight on", 0.0, 12.0, ((2.0, 7.5), (14.0, 7.5)),
 
 def serve_wearer() -> None:
     """A wearer who stands still, guided to a room."""
-    users.has_other_users = lambda: False  # else there would be a token in the address
+    access.has_other_users = lambda: False  # else there would be a token in the address
     with served(Mailbox(PLAN, "echostep live", replay=False)) as (server, mailbox):
         print(server.url, flush=True)
         goal: Goal | None = None
@@ -51,7 +51,7 @@ def serve_wearer() -> None:
 
 def serve_commander() -> None:
     """Eight wearers, one of them fallen, of whom nothing new is heard."""
-    users.has_other_users = lambda: False
+    access.has_other_users = lambda: False
     team = whole_team(Team(now_s=0.0))
     with ServedTeam(team) as table:
 

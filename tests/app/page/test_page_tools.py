@@ -210,7 +210,7 @@ def test_the_floor_is_saved_as_geojson(browser: Any, url: str, tmp_path: Path) -
 
 def test_a_georeferenced_plan_gives_longitude_latitude_and_mgrs(browser: Any, tmp_path: Path) -> None:
     pytest.importorskip("pyproj")
-    from echostep_app.team.georeference import GroundPlane
+    from echostep_app.team.publish import GroundPlane
 
     with PageServer(walked(PLACED), LOCAL) as server, looking(browser, server.url) as page:
         page.mouse.click(*spot(page, 4.0, 7.5))

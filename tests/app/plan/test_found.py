@@ -20,8 +20,7 @@ from echostep.plan import Door, Plan, load_plan, parse_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import doors_in_gaps, size_m, summary
 from plan.drawings.drawn_houses import write_house
 from plan.imported_plans import seven_floors

@@ -12,8 +12,7 @@ from typing import Any
 
 from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
 

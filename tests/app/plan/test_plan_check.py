@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the check finds, that it finds nothing in sound plans, and the pictures."""
+"""What the check finds, that it finds nothing in sound plans, and the pictures; drawn storeys that are no plan."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ from echostep_app.cli import app
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.cropping import within
 from echostep_app.plan.pictures.drawing import draw_plan
-from echostep_app.plan.places.findings import PlanFinding
+from echostep_app.plan.places.findings import PlanFinding, refusals
+from localization.test_drawn_places import ROOM as DRAWN
+from localization.test_drawn_places import drawing
 from snapshots import expect
 
 DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
@@ -269,3 +272,15 @@ def test_no_label_covers_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(boxes) < 4 + 40
     assert not [(a, b) for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
     assert f"({44 - len(boxes)} names do not fit" in axes.get_title()
+
+
+def test_a_drawn_storey_that_is_not_known_to_a_room_is_refused() -> None:
+    """Its walls are compared with no echo, and a sentence names it; doubtful walls of one that is known are compared."""
+    known, refused = (drawing([2.0, 4.0, sd_m]).levels[0] for sd_m in (0.3, 1.2))
+    partly = replace(known, walls=DRAWN[:1], doubtful=DRAWN[1:])
+    assert (len(partly.heard), len(partly.solid)) == (4, 1)
+    plan = Plan("by anna", (known, replace(refused, name="1", walls=DRAWN[:0], doubtful=DRAWN)), None, "")
+    (sentence,) = refusals(plan)
+    assert sentence.startswith("floor 1 of by anna is refused as a plan")
+    assert len(plan.levels[1].heard) == 0
+    assert refusals(drawing()) == []

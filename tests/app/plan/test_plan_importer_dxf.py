@@ -13,7 +13,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.importers.dxf import entities as dxf_entities
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.report import Hints
 
 
 def drawing(insunits: int = 6) -> tuple[Any, Any]:

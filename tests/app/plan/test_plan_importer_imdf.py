@@ -15,8 +15,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import summary
 
 LON, LAT = -2.978, 56.46

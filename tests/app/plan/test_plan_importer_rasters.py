@@ -12,9 +12,8 @@ from PIL import Image, ImageDraw
 import command_line
 from echostep.plan import load_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
-from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.raster.picture import threshold
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import size_m
 from echostep_app.plan.places.gaps import door_gaps
 

@@ -17,9 +17,9 @@ from PIL import Image
 
 from echostep_app.commands.options import layers_of, unit_of, windows_of
 from echostep_app.plan.importers.formats import NEXT_STEPS, PICTURES, import_plan, is_foreign
-from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.imdf import archive
 from echostep_app.plan.importers.parsing import FORMATS
+from echostep_app.plan.importers.report import Hints
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
 from plan.test_plan_importer_rasters import grid

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ports: found again by serial number, read in blocks over TCP; the end of a run loses nothing that had arrived."""
+"""Ports: found again by serial number, read in blocks over TCP; the end of a run loses nothing that had arrived; sleep is noticed."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
+from echostep_app.ports.access import port_of_number, usb_number
+from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from echostep_app.ports.serial_ports import ChunkQueue, SerialPorts
-from echostep_app.ports.usb_number import port_of_number, usb_number
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.runs import live
 from players import pseudo_terminal
@@ -155,3 +156,15 @@ def test_a_signal_ends_a_run_that_is_behind_with_all_that_had_arrived(
     assert done.returncode == 0, done.stderr
     recorded = b"".join(chunk.data for chunk in open_recording(tmp_path / "walk.mcap").chunks())
     assert recorded == b"".join(sent)
+
+
+SECOND_NS = 1_000_000_000
+
+
+def test_sleep_is_noticed() -> None:
+    arrival, awake = iter([100, 100, 60 * SECOND_NS, 60 * SECOND_NS, 60 * SECOND_NS]), iter([50, 50, 50, 50, 50])
+    watch = SleepWatch(lambda: next(arrival), lambda: next(awake))
+    assert watch.slept_s() == 0.0
+    assert watch.slept_s() == pytest.approx(60.0, abs=0.1)
+    assert watch.slept_s() == 0.0
+    assert now_ns() <= now_ns()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Starts of runs: the last place that a live run keeps, the start in a recording's fields, as written and damaged."""
+"""Starts of runs: the last place that a live run keeps, the start in a recording's fields, as written and damaged; the start after a pause."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from echostep.settings import Settings
 from echostep.tracker import Tracker
 from echostep.tracker.state import LastPlace
 from echostep.walk.recorded import recorded_start
-from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
+from echostep_app.session.last_place import FILE, KEPT_S, MOVED_M, Kept, PlaceKeeper, read_kept, start_after, start_last
 from echostep_app.session.metadata import parse_start, run_metadata
 from echostep_app.session.runs.live import _last_start
-from echostep_simulation.world.tower import tower
+from echostep_simulation.world.tower import STOREY_M, tower
 from snapshots import expect, refusal
 
 PLAN = tower(3)
@@ -192,3 +192,29 @@ def test_a_room_is_read_as_it_was_written() -> None:
 def test_a_damaged_start_is_refused(start: Pose | Start, damage: dict[str, str]) -> None:
     with pytest.raises(EchostepError, match="its recorded start is damaged: give one with --start"):
         recorded_start(run_metadata(NO_PLAN, start, 1, "") | damage, PATH)
+
+
+ZERO_M = 100.0  # height by pressure on the lowest floor
+
+
+AWAY_S = 60.0
+
+
+CLIMBING = ClimbSettings()
+
+
+def test_the_start_is_wider_than_the_place_and_has_any_heading() -> None:
+    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), AWAY_S, CLIMBING)
+    assert start.pose is not None
+    assert (start.pose.x_m, start.pose.y_m, start.pose.level) == (3.0, 4.0, 1)
+    assert (start.sd_m, start.heading_sd_rad) == (math.hypot(0.2, MOVED_M), math.pi)
+    assert start.after_pause
+    assert start.air is not None
+    assert start.air.zero_m == ZERO_M
+    assert 0.15 < start.air.sd_m < 0.25
+
+
+def test_hours_make_the_pressure_worthless() -> None:
+    start = start_after(LastPlace(3.0, 4.0, 0.2, 1, Air(ZERO_M, 0.1)), 3600.0, CLIMBING)
+    assert start.air is not None
+    assert start.air.sd_m > STOREY_M

@@ -17,10 +17,9 @@ from echostep.plan import Georeference, load_plan
 from echostep_app.team import outbox
 from echostep_app.team.cot import event, uid
 from echostep_app.team.endpoint import parse_endpoint
-from echostep_app.team.georeference import GroundPlane
 from echostep_app.team.messages.report import BadReportError, Report, check_name, decode, encode
 from echostep_app.team.outbox import Delivery, Outbox, stamped
-from echostep_app.team.publish import ReportHistory
+from echostep_app.team.publish import GroundPlane, ReportHistory
 from team.team_reports import PLACE, PLAN, POSITION, UNIX, report
 from waiting import PATIENCE_S, until
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much a ping counts: by the way since the one before, and never as a whole."""
+"""How much a ping counts: by the way since the one before, and never as a whole; missed echoes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.likelihood import PRIOR_HEARD, PRIOR_MISSED, EchoSettings, MissedEchoes, echo_model
 from echostep.echoes.unplanned import UsablePings
 from echostep.errors import EchostepError
 from echostep.localization import Building, MapFilter, Start
@@ -74,3 +74,36 @@ def test_who_turns_at_the_end_of_a_corridor_is_placed_by_its_end() -> None:
 def test_a_share_that_is_none_is_refused(own: float) -> None:
     with pytest.raises(EchostepError, match=r"me\.toml: \[echo\] own: "):
         parse_settings(f"[echo]\nown = {own}\n", "me.toml")
+
+
+PRIOR = PRIOR_MISSED / PRIOR_HEARD
+
+
+def odds(ranges_m: list[float], ranger: int = 0) -> float:
+    missed = MissedEchoes()
+    for range_m in ranges_m:
+        missed.update(0, range_m)
+    return missed.odds(ranger)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_the_share_of_missed_echoes_of_a_wall_is_learnt(share: float) -> None:
+    rng = np.random.default_rng(1)
+    ranges_m = np.where(rng.random(400) < share, 0.0, 1.2 + 0.03 * rng.standard_normal(400))
+    assert odds(ranges_m.tolist()) == pytest.approx(share / (1.0 - share), rel=0.3)
+
+
+def test_it_is_forgotten_when_the_ranger_is_in_order_again() -> None:
+    assert odds([1.0, 0.0] * 200 + [1.0] * 600) < 0.1
+
+
+def test_doors_and_far_walls_teach_nothing() -> None:
+    door = [1.0] * 5 + [0.0] * 12 + [1.0] * 5
+    step = [1.0, 0.0, 1.4, 0.0] * 20
+    far = [4.5, 0.0] * 50
+    assert odds(door) <= PRIOR
+    assert odds(step) == odds(far) == PRIOR
+
+
+def test_each_ranger_has_odds_of_its_own() -> None:
+    assert odds([1.0, 0.0] * 100, ranger=1) == PRIOR

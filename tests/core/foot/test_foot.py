@@ -160,7 +160,7 @@ def test_update_agrees_with_the_textbook(update: Callable[..., None], measured: 
 def test_covariance_stays_symmetric_and_positive() -> None:
     foot = Foot()
     foot.feed(*walking(40, 200))
-    P = foot._nav.P
+    P = foot.nav.P
     scale = np.sqrt(np.diag(P)) + 1e-12
     assert np.abs(P - P.T).max() <= 1e-9 * scale.max() ** 2
     assert np.linalg.eigvalsh(P / np.outer(scale, scale)).min() > -1e-6

@@ -168,7 +168,7 @@ def test_any_numbers_are_survived(table: Floats, scale: float) -> None:
     assert counts.samples + counts.impossible + counts.not_later == len(t) + len(table)
     assert np.isfinite(foot.position_m).all()
     assert math.isfinite(foot.heading_rad)
-    assert np.isfinite(foot._nav.P).all()
+    assert np.isfinite(foot.nav.P).all()
 
 
 def test_wrong_shapes_are_refused_in_one_line() -> None:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Times that come in bursts are spread evenly and told; other times stay as they are."""
+"""Times that come in bursts are spread evenly and told; numbers that no sensor and no clock gives are none."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.offline.bursts import spread
+from echostep.offline.csv_table import EARLY_ROWS, CsvLimits, number_of, read_rows
 from echostep.offline.imu_csv import load_imu
 
 EVEN_S: Floats = np.arange(0.0, 24.865, 0.01)
@@ -56,3 +59,26 @@ def test_a_file_with_bursts_is_used_whole_and_says_so(tmp_path: Path, apart_s: f
     imu = load_imu(tmp_path / "f.csv")
     assert len(imu.t_s) == 2487
     assert imu.notes == ("times come in bursts of 3: spread evenly, 100 samples a second",)
+
+
+@pytest.mark.parametrize("cell", ["inf", "-inf", "Infinity", "1e308", "1e400", "nan", "", "x", "1e20"])
+def test_impossible_numbers_are_none(cell: str) -> None:
+    assert math.isnan(number_of(cell))
+
+
+@pytest.mark.parametrize("cell", ["0", "-1.5", "1.7e18", " 3 "])
+def test_possible_numbers_are_read(cell: str) -> None:
+    assert number_of(cell) == float(cell)
+
+
+def test_a_file_of_garbage_is_given_up_early() -> None:
+    read = list[int]()
+
+    def lines() -> Iterator[str]:
+        for k in range(10 * EARLY_ROWS):
+            read.append(k)
+            yield "x\n" if k % 3 else "1\n"
+
+    with pytest.raises(ValueError, match="67 % of the first 2000 rows have no number"):
+        read_rows(lines(), (["a"], ","), [0], 1, CsvLimits())
+    assert len(read) == EARLY_ROWS

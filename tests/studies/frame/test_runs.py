@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep_app.commands import studies
+from echostep_app import cli
 from echostep_app.commands.actions import offline as profiles
 from echostep_studies.frame.report import as_dicts, write_json
 from echostep_studies.frame.runs import Journal, SeededRuns
@@ -197,18 +197,18 @@ def test_each_entry_point_leads_into_the_wheel(wheel: zipfile.ZipFile) -> None:
     points = configparser.ConfigParser()
     points.read_string(wheel.read(name).decode())
     found = {group: dict(points[group]) for group in points.sections()}
-    assert set(found) == {studies.GROUP, profiles.GROUP}
-    assert set(found[studies.GROUP]) == {studies.NAME}
+    assert set(found) == {cli.STUDIES, profiles.GROUP}
+    assert set(found[cli.STUDIES]) == {"evaluate"}
     assert set(found[profiles.GROUP]) == {"foot.fischer2008", "legs.lee2010"}
     modules = [point.split(":")[0] for group in found.values() for point in group.values()]
     assert {f"{module.replace('.', '/')}.py" for module in modules} <= set(wheel.namelist())
 
 
 def test_without_the_distribution_a_command_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(studies, "entry_points", lambda **_: ())
+    monkeypatch.setattr(cli, "entry_points", lambda **_: ())
     alone_app = typer.Typer()
-    studies.add_studies(alone_app)
-    words = studies.NAME, "girard2011", "--runs", "1"
+    cli.add_studies(alone_app)
+    words = "evaluate", "girard2011", "--runs", "1"
     alone, asked = (CliRunner().invoke(alone_app, given) for given in (words[:1], words))
     assert "pip install echostep-studies" in alone.output
     assert isinstance(asked.exception, EchostepError)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Girard et al. 2011: each printed formula against a naive twin, whole steps, and the study of their experiment."""
+"""Girard et al. 2011: each printed formula against a naive twin, whole steps, and the study of their experiment; a fan of rays."""
 
 from __future__ import annotations
 
@@ -9,21 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiLineString
 
 from command_line import echostep
+from echostep.arrays import Floats
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.study import echoes_study
 from echostep_studies.frame.report import rows_by_name, summary
 from echostep_studies.frame.study import StudyRequest, run_study
 from echostep_studies.girard2011 import kit_feet, kits, study
 from echostep_studies.papers.girard2011 import Girard, GirardSettings, average, disc, merge, moved, similarity
+from echostep_studies.papers.girard2011_rays import lambda_ray_ranges
 from echostep_studies.simulation import sites
 from echostep_studies.simulation.marker_walk import STEP_M, lay_markers, walk_markers
 from echostep_studies.simulation.sites import otb
 from naive import walls as naive
+from walls.test_walls import plans
 
 ROOM = np.array([[0.0, 0.0, 5.0, 0.0], [5.0, 0.0, 5.0, 3.0], [5.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]])
 PRINTED = GirardSettings()
@@ -245,3 +248,39 @@ def test_the_table_of_kits_has_the_rows_of_a_filter_together() -> None:
     names = ["default, SRF02", "paper's filter, SRF02", "default, pulse"]
     (table,) = kits.STUDY.tables([{"name": name} for name in names], StudyRequest(1, 1, None, Path()))
     assert [row["name"] for row in table.rows] == [names[0], names[2], names[1]]
+
+
+@pytest.mark.long
+@settings(max_examples=150, deadline=None)
+@given(plans(), st.sampled_from([7, 7, 7, 1, 3, 20]), st.sampled_from([0.0, 0.5, 1.0, 2.0]))
+def test_cone_readings_agree_with_plain_rays(
+    plan: tuple[Floats, np.random.Generator], rays: int, prepared: float
+) -> None:
+    walls, rng = plan
+    aperture = math.radians(55.0)
+    owner = Walls(walls, prepared * 0.5 * aperture / rays)
+    x, y, heading = rng.uniform(-2, 10, 12), rng.uniform(-2, 10, 12), rng.uniform(-4, 4, 12)
+    index = owner.near(x[:9], y[:9])
+    found = lambda_ray_ranges(x, y, heading, index, rays, aperture, 6.0)
+    for i, row in enumerate(found):
+        for axis, reading in zip((math.pi / 2, -math.pi / 2), row, strict=True):
+            expected = naive.cone_reading(x[i], y[i], heading[i] + axis, walls, rays, aperture, 6.0)
+            assert reading == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.long
+def test_many_poses_read_what_each_would_alone() -> None:
+    """Many in a tile, in no order, some nowhere."""
+    rng = np.random.default_rng(5)
+    walls = rng.uniform(0.0, 6.0, (20, 4))
+    owner = Walls(walls, 0.5 * math.radians(55.0) / 7)
+    x, y, heading = rng.uniform(2.0, 4.0, 768), rng.uniform(2.0, 3.0, 768), rng.uniform(-4, 4, 768)
+    x[::50], heading[7::50] = np.nan, np.inf
+    index = owner.near(x, y)
+    cone = 7, math.radians(55.0), 6.0
+    found = lambda_ray_ranges(x, y, heading, index, *cone)
+    alone = [lambda_ray_ranges(x[i : i + 1], y[i : i + 1], heading[i : i + 1], index, *cone)[0] for i in range(len(x))]
+    assert found == pytest.approx(np.array(alone), abs=1e-9)
+    assert (found[::50] == 6.0).all()
+    assert (found[7::50] == 6.0).all()
+    assert len(np.unique(found)) > 256

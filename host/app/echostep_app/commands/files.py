@@ -65,10 +65,12 @@ def import_command(
 ) -> None:
     """Make a recording of a foot IMU's file, and of other sensors' on its clock, for replay and export."""
     from echostep_app.commands.actions import offline
-    from echostep_app.offline.foreign_columns import parse_naming
+    from echostep_app.offline.foreign_columns import Naming, parse_naming
     from echostep_app.offline.importing import Beside
 
-    offline.import_foot(imu, out, parse_naming(columns, units), Beside(pressure, ranges, legs, settings), truth)
+    naming = parse_naming(columns, units)
+    beside = Beside(pressure, ranges, legs, settings, Naming(naming.columns))
+    offline.import_foot(imu, out, naming, beside, truth)
 
 
 @app.command(epilog=example("echostep foot imu.csv --plan building.dxf --start 2,7.5,0"))
@@ -191,16 +193,13 @@ def score(
         bool,
         typer.Option("--taps", help="The places tapped on the page of a recorded run are the truth; needs --plan."),
     ] = False,
-    setup: Annotated[
-        float | None, typer.Option("--setup", metavar="S", help="Set-up time of the system, to be listed.", min=0.0)
-    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
 ) -> None:
     """Score tracks against the truth by ISO/IEC 18305 and EvAAL."""
     from echostep_app.commands.actions import score as scoring
     from echostep_app.session.options import TrackingOptions
 
-    scoring.score(tracks, truth, TrackingOptions(plan, start), setup, taps=taps, as_json=as_json)
+    scoring.score(tracks, truth, TrackingOptions(plan, start), taps=taps, as_json=as_json)
 
 
 @app.command()

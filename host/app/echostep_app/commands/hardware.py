@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`echostep doctor`, `bench-report`, `flash` and `calibrate`: commands about boards and sensors.
+"""`echostep doctor`, `bench-report`, `flash`, `calibrate` and `beacons simulate`: commands about boards and sensors.
 
-In: the command's arguments and options. Out: findings, a flashed board, settings. Slow imports wait until a command runs.
+In: the command's arguments and options. Out: findings, a flashed board, settings, frames on a port. Slow imports wait until a command runs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from echostep_app.commands.options import Shank, Thigh, out_option
+from echostep_app.commands.options import Seed, Shank, Thigh, out_option
 from echostep_app.printing.lines import say
 
 app = typer.Typer()
@@ -114,3 +114,32 @@ def calibrate(
 
     wearer = calibration.Wearer(thigh, shank, walked)
     calibration.calibrate(calibration.Ports(board, foot), parts or [], wearer, out, console_for_people(highlight=False))
+
+
+beacons_app = typer.Typer(no_args_is_help=True, help="Beacons: a simulated gateway.")
+
+
+@beacons_app.callback()
+def beacons() -> None:
+    """Beacons: a simulated gateway."""
+
+
+@beacons_app.command()
+def simulate(
+    plan: Annotated[Path, typer.Option("--plan", help="The building's plan: walls hide beacons.")],
+    truth: Annotated[
+        Path, typer.Option("--truth", metavar="FILE", help="Path of the wearer: CSV t_s,x,y,heading_rad.")
+    ],
+    to: Annotated[
+        str, typer.Option("--to", metavar="PORT", help="udp://HOST:PORT[?key=FILE], or a serial port.")
+    ] = "udp://127.0.0.1:9000",
+    spacing: Annotated[
+        float, typer.Option("--spacing", metavar="M", help="Distance between beacons along the walk.", min=0.5)
+    ] = 5.0,
+    pace: Annotated[float, typer.Option("--pace", help="Speed, as a multiple of real time.", min=0.01)] = 1.0,
+    seed: Seed = 1,
+) -> None:
+    """Simulate beacons along a walk, and send their measurements as their gateway does, in real time."""
+    from echostep_app.commands.actions.beacon_player import simulate_gateway
+
+    simulate_gateway(plan, truth, to, spacing, pace, seed)

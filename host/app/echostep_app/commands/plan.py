@@ -92,8 +92,8 @@ def import_(
 ) -> None:
     """Convert a building in another format to a plan, and show the imported and the omitted parts."""
     from echostep_app.commands.options import layers_of, scale_of, unit_of, windows_of
-    from echostep_app.plan.importers.hints import Hints
     from echostep_app.plan.importers.limited import import_reported
+    from echostep_app.plan.importers.report import Hints
     from echostep_app.plan.importers.summary import summary
     from echostep_app.plan.questions import with_questions
     from echostep_app.plan.writer import save_plan

@@ -30,7 +30,7 @@ from echostep_app.commissioning.probe import ProbeResult, probe
 from echostep_app.commissioning.serial_ports import access_findings, find_boards, list_seen
 from echostep_app.offline.leg_track import checked_lengths
 from echostep_app.printing.lines import as_error, write_whole
-from echostep_app.printing.progress import listening_bar
+from echostep_app.printing.progress import progress_line
 
 STILL_S, TURN_S, WALK_S = 10.0, 20.0, 20.0  # duration of each measurement
 POSE_S = 3.0  # of a board in each pose: a second passes before it sends all axes, the mean of 200 samples is known to 0.003 m/s2
@@ -104,7 +104,7 @@ def calibrate(ports: Ports, names: list[str], wearer: Wearer, out: Path, console
         console.print(request.format(walked_m=wearer.walked_m))
         seconds = next(group).seconds
         _wait(console)
-        probed = _probe(str(ports.board), seconds, f"Listening for {seconds:g} s", console)
+        probed = _probe(str(ports.board), seconds, f"Listening for {seconds:g} s")
         _check_gyros(probed)
         for part in (part for part in parts if part.request == request):
             known = parse_settings(_text(sections), str(out))  # with what this calibration has just written
@@ -122,7 +122,7 @@ def _calibrate_accelerometers(ports: list[str], out: Path, sections: Sections, c
 
     def listen(text: str) -> list[ProbeResult]:
         _wait(console)
-        return [_probe(port, POSE_S, text, console) for port in ports]
+        return [_probe(port, POSE_S, text) for port in ports]
 
     for place, errors in measure_poses(listen, console).items():
         console.print(described(place, errors))
@@ -159,9 +159,9 @@ def _check_usual(values: dict[str, Values], console: Console) -> None:
         raise EchostepError(f"{words}; nothing was written of it")
 
 
-def _probe(port: str, seconds: float, text: str, console: Console) -> ProbeResult:
-    """The `ProbeResult` of the board at this port; a progress bar shows `text` meanwhile."""
-    with listening_bar(text, seconds, console):
+def _probe(port: str, seconds: float, text: str) -> ProbeResult:
+    """The `ProbeResult` of the board at this port; `text` is shown meanwhile."""
+    with progress_line(text):
         probed = probe({BOARD: port}, seconds)
     if probed.stale_firmware:
         raise EchostepError(probed.stale_firmware)

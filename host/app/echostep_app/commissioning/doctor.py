@@ -30,7 +30,7 @@ from echostep_app.commissioning.serial_ports import (
     rules_text,
 )
 from echostep_app.printing.console import console_for_people
-from echostep_app.printing.progress import listening_bar
+from echostep_app.printing.progress import progress_line
 from echostep_app.recording.device import sender, wrong_device
 
 PROBE_S = 6.0
@@ -44,7 +44,7 @@ def run(
 ) -> bool:
     """Check everything and print the report; returns whether there is no warning and no fault."""
     console = console_for_people(highlight=False)
-    with listening_bar("Looking at the ports and listening: stand still", seconds, console):
+    with progress_line(f"Looking at the ports and listening for {seconds:g} s: stand still"):
         report = examine(board, mtx, seconds, foot, electrical=electrical)
     print_report(report, console)
     return report.fine

@@ -26,6 +26,7 @@ from echostep.settings import Settings
 from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.commissioning.probe import ProbeResult
 from echostep_app.offline.leg_track import calibrated_scale
+from echostep_app.printing.lines import faults_of
 
 Values = dict[str, float | bool]
 Fit = tuple[dict[str, Values], str]
@@ -96,10 +97,8 @@ def fit_gyros(probed: ProbeResult) -> Fit:
         if not np.isfinite(rate[:, k]).any():
             parts.append(f"{name} none (it does not answer)")
             continue
-        try:
+        with faults_of(f"{name} gyro"):
             bias, noise = still_bias(t_s, rate[:, k])
-        except ValueError as error:
-            raise EchostepError(f"{name} gyro: {error}") from error
         values[f"{name}_bias_rad_s"] = round(bias, 6)
         parts.append(f"{name} {math.degrees(bias):+.2f} degrees/s (noise {math.degrees(noise):.2f})")
     if not values:
@@ -155,10 +154,8 @@ def fit_compass(probed: ProbeResult, settings: Settings) -> Fit:
     t_s, belt, read_s, heading = _turn(probed, settings)
     read = np.full(len(t_s), np.nan)
     read[np.clip(np.searchsorted(t_s, read_s), 0, len(t_s) - 1)] = heading
-    try:
+    with faults_of("compass", ", and do it again"):
         iron = fit_compass_errors(t_s, belt, read)
-    except ValueError as error:
-        raise EchostepError(f"compass: {error}, and do it again") from error
     names = ("sin1", "cos1", "sin2", "cos2", "rms_rad")
     values: Values = {name: round(float(getattr(iron, name)), 5) for name in names}
     hard, soft = math.hypot(iron.sin1, iron.cos1), math.hypot(iron.sin2, iron.cos2)

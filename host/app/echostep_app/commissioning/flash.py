@@ -30,7 +30,7 @@ from echostep.ports.chunks import BOARD
 from echostep_app.commissioning.probe import probe
 from echostep_app.commissioning.serial_ports import BOARD_NAME, Role, access_findings, find, list_seen
 from echostep_app.interruption import wait_for
-from echostep_app.ports.port_faults import PORT_FAULTS
+from echostep_app.ports.access import PORT_FAULTS
 
 TOUCH_BAUD = 1200  # opening the port at this rate and closing it starts the bootloader
 BOOTLOADER_S = 10.0  # longest wait for its port; the bootloader runs for eight seconds

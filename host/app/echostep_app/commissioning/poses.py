@@ -22,6 +22,7 @@ from echostep.timing.timeline import TICKS_PER_S
 from echostep_app.board.faults.device_faults import foot_celsius, gyro_celsius
 from echostep_app.commissioning.imu_errors import POSES, RestPose, check_unlike, fit_errors, pose_of
 from echostep_app.commissioning.probe import SETTLED_S, ProbeResult
+from echostep_app.printing.lines import faults_of
 
 TRIES = 3  # of each pose; assumed
 FOOT_PLACE = "foot"
@@ -78,10 +79,8 @@ def measure_poses(listen: Listen, console: Console) -> dict[str, ImuSettings]:
             celsius.setdefault(place, []).append(warm)
     settings = {}
     for place, lay in poses.items():
-        try:
+        with faults_of(place):
             settings[place] = fit_errors(lay, GRAVITY_M_S2, float(np.mean(celsius[place])))
-        except ValueError as error:
-            raise EchostepError(f"{place}: {error}") from error
     return settings
 
 

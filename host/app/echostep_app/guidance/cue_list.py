@@ -6,10 +6,9 @@ In: cues in order of time. Out: the newest ones; cues.csv. Owns the list.
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
-from echostep.file_mode import claim
+from echostep.file_mode import write_csv
 from echostep_app.guidance.cues import Cue, Guide
 from echostep_app.plan.routing import Route
 
@@ -41,7 +40,4 @@ class CueList:
 
     def write(self, path: Path) -> None:
         """All cues as CSV."""
-        with claim(path).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(CUE_COLUMNS)
-            writer.writerows([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues)
+        write_csv(path, CUE_COLUMNS, ([getattr(cue, name) for name in CUE_COLUMNS] for cue in self.cues))

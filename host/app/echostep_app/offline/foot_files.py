@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A foot IMU's recording as other programs keep it: a table, a folder or zip of tables, a MAT file, an MVNX file.
+"""A foot IMU's recording as other programs keep it: a table, a folder or zip of tables, a MAT file, an MVNX file, a bag.
 
 In: a path. Out: `Imu`, or an EchostepError that names the file and its fault (gliding, too). Owns nothing.
 
@@ -31,7 +31,8 @@ from echostep.offline.imu_checks import NEEDED
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
 from echostep_app.offline.foreign_columns import OWN, Naming, read_header
-from echostep_app.printing.lines import as_error
+from echostep_app.offline.ros_bag import IMU, is_bag, read_bag
+from echostep_app.printing.lines import as_error, faults_of
 
 SESSIONS = ("inertial", "sensors", "raw data")  # files of one session that have both sensors: x-IMU3, NGIMU, phyphox
 MAT_IMU, MAT_TIME = ("imu_data", "imu"), ("timestamps_all", "timestamps", "ts", "t_s")
@@ -41,6 +42,8 @@ MOST_BYTES = 1 << 30  # of the tables of a zip, and of a MAT or MVNX file; assum
 
 def load_foot(path: Path, naming: Naming = OWN) -> Imu:
     """Samples of a file or folder of any program."""
+    if is_bag(path):
+        return _imu(path, *read_bag(path, IMU, "imu", naming))
     if path.is_dir():
         return _folder(path, path.glob("*.csv"), naming)
     if path.is_file() and zipfile.is_zipfile(path):
@@ -51,11 +54,14 @@ def load_foot(path: Path, naming: Naming = OWN) -> Imu:
     with as_error(f"{path}: cannot read the samples"):
         if path.stat().st_size > MOST_BYTES:
             raise EchostepError(f"{path}: larger than {MOST_BYTES >> 30} GB: cut the recording into parts")
-    try:
-        table, notes = reader(path)
+    with faults_of(path):
+        return _imu(path, *reader(path))
+
+
+def _imu(path: Path, table: Floats, notes: tuple[str, ...]) -> Imu:
+    """The usable rows of (n, 7)."""
+    with faults_of(path):
         return imu_of(np.where(np.abs(table) <= GREATEST, table, np.nan), notes)
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
 
 
 def _zip(path: Path, naming: Naming) -> Imu:
@@ -101,10 +107,7 @@ def _folder(path: Path, files: Iterable[Path], naming: Naming) -> Imu:
         notes.append("an iPhone's, not standardised: the signs of its accelerations are changed")
     elif "gravity" in notes[-1] and not system:
         notes.append("read as of Android; of an iPhone, not standardised, the track is mirrored: add its Metadata.csv")
-    try:
-        return imu_of(np.column_stack([gyro[:, 0], accel, gyro[:, 1:]]), tuple(notes))
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
+    return _imu(path, np.column_stack([gyro[:, 0], accel, gyro[:, 1:]]), tuple(notes))
 
 
 def _system(metadata: Path | None) -> str:

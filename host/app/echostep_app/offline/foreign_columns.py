@@ -154,7 +154,7 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     counts_hz, period = _counter("" if "time" in units else columns.get("t_s", ""), above, clocked=CLOCK in theirs)
     names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     names = _renamed(theirs, columns) if columns else names
-    factors = _factors(names, titled, units)
+    factors = factors_of(names, titled, units)
     advice = ("" if naming.columns else proposal(theirs, titled, first, counted=counted)) or ADVICE
     return Header(names, separator, line, factors, counts_hz, period, notes, advice, tuple(begin))
 
@@ -240,7 +240,7 @@ def _renamed(theirs: list[str], columns: Mapping[str, str]) -> list[str]:
     return [by_theirs.get(name, "" if name in columns else name) for name in theirs]
 
 
-def _factors(names: list[str], theirs: list[str], units: Mapping[str, str]) -> dict[str, float]:
+def factors_of(names: list[str], theirs: list[str], units: Mapping[str, str]) -> dict[str, float]:
     """Factors to SI by name: of the unit given for the quantity, else in the brackets of the file's name; raises ValueError for an unknown one."""
     factors: dict[str, float] = {}
     quantities = {quantity_of(name) for name in names}

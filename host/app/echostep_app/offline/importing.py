@@ -8,6 +8,7 @@ floats, and of a board's messages. Owns nothing.
 from __future__ import annotations
 
 import heapq
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +23,15 @@ from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID,
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import lines_of, open_samples
 from echostep.offline.imu_csv import LIMITS, Imu
-from echostep.ports.chunks import BOARD, Chunk
+from echostep.ports.chunks import BOARD, MTX, Chunk
+from echostep.ports.imu_samples import SampleCounter
 from echostep.settings import imu_settings, parse_settings, read_settings
 from echostep.timing.timeline import TICKS_PER_S
+from echostep.xsens import MTDATA2, encode_frame
 from echostep_app.offline.floors.pressure_csv import load_pressures
-from echostep_app.offline.foreign_columns import OWN, read_header
-from echostep_app.offline.imu_chunks import ImuChunks
+from echostep_app.offline.foreign_columns import OWN, Naming, read_header
 from echostep_app.offline.leg_csv import load_pair
+from echostep_app.offline.ros_bag import RANGE, is_bag, read_bag
 from echostep_app.recording.recorder import Recorder
 
 Message = Ping | Pressure | Gyros
@@ -36,18 +39,21 @@ GAP = 1.5  # periods: a longer step is a gap
 AT_ONCE = 10_000  # samples, which bound the memory
 FARTHEST_M = 0.5 * 65_535e-6 * SPEED_OF_SOUND_M_S  # that a ping can state
 RANGES = ("t_s", "direction_deg", "range_m")
+_SAMPLE = struct.Struct(">HBHHB3fHB3f")  # packets of identifier, length and value [LLCP, MTData2]
+_COUNTER, _ACCEL, _GYRO = 0x1020, 0x4020, 0x8020
 
 
 @dataclass(frozen=True, slots=True)
 class Beside:
     """Files of other sensors, None without: `ranges` t_s, direction_deg (left positive), range_m; `pressure` t_s, pressure_pa; `legs` as of the
-    command; `settings` (TOML) of the rangers, for instance.
+    command; `settings` (TOML) of the rangers, for instance; `topics` of bags.
     """
 
     pressure: Path | None = None
     ranges: Path | None = None
     legs: Path | None = None
     settings: Path | None = None
+    topics: Naming = OWN
 
 
 def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside: Beside = Beside()) -> str:
@@ -77,6 +83,25 @@ def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside:
     return f"{told}t_s of its track counts from {begin_s:.3f} s in the file"
 
 
+class ImuChunks:
+    """Samples of any foot IMU as messages of an MTx, MTData2, with values as 32-bit floats, arriving at the times of the samples."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._counter = SampleCounter(rate_hz)
+
+    @property
+    def left_out(self) -> int:
+        """Samples within the same period as the one before."""
+        return self._counter.left_out
+
+    def of(self, t_s: Floats, accel: Floats, gyro: Floats) -> Iterator[Chunk]:
+        """Chunks of samples as in `SampleCounter.of`."""
+        rows = (column.tolist() for column in self._counter.of(t_s, accel, gyro))
+        for counter, t_arrival_ns, force, rate in zip(*rows, strict=True):
+            payload = _SAMPLE.pack(_COUNTER, 2, counter, _ACCEL, 12, *force, _GYRO, 12, *rate)
+            yield Chunk(MTX, t_arrival_ns, encode_frame(MTDATA2, payload))
+
+
 def rate_of(t_s: Floats) -> float:
     """Samples a second, from the times (n,), without the gaps; times in whole milliseconds give it, too."""
     steps = np.diff(t_s)
@@ -103,11 +128,11 @@ def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
     found: list[tuple[float, Message]] = []
     settings = read_settings(beside.settings) if beside.settings else ""
     if beside.pressure:
-        air = load_pressures(beside.pressure).samples
+        air = load_pressures(beside.pressure, beside.topics if is_bag(beside.pressure) else OWN).samples
         quarters = zip(air.t_s.tolist(), np.rint(4.0 * air.pressure_pa).astype(int).tolist(), strict=True)
         found += [(t, Pressure(0, count, PRESSURE_TEMPERATURE_INVALID)) for t, count in quarters]
     if beside.ranges:
-        pings, ahead_deg = _pings(beside.ranges)
+        pings, ahead_deg = _pings(beside.ranges, beside.topics)
         found += pings
         settings = f"\n[ranger]\nspeed_of_sound_m_s = {SPEED_OF_SOUND_M_S}\nahead_deg = {ahead_deg!r}\n\n{settings}"
     if beside.legs:
@@ -118,9 +143,9 @@ def _messages(beside: Beside) -> tuple[list[tuple[float, Message]], str]:
     return sorted(found, key=lambda each: each[0]), settings
 
 
-def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
+def _pings(path: Path, topics: Naming) -> tuple[list[tuple[float, Message]], float]:
     """Times and pings of a file of ranges, an empty range being no echo; how far ahead of abeam (deg) its rangers look."""
-    rows = open_samples(path, _ranges)
+    rows = _bag_ranges(path, topics) if is_bag(path) else open_samples(path, _ranges)
     ahead = np.unique(90.0 - np.abs(rows[:, 1]))
     if len(ahead) != 1 or abs(ahead[0]) > MOST_AHEAD_DEG:
         raise EchostepError(
@@ -137,6 +162,12 @@ def _pings(path: Path) -> tuple[list[tuple[float, Message]], float]:
         side = Ranger.LEFT if direction > 0.0 else Ranger.RIGHT
         pings.append((t_s, Ping(0, side, Outcome.ECHO if heard else Outcome.NO_ECHO, flight_us)))
     return pings, float(ahead[0])
+
+
+def _bag_ranges(path: Path, topics: Naming) -> Floats:
+    """RANGES (n, 3) of a bag's rangers, which look to the left and to the right."""
+    both = [(90.0, read_bag(path, RANGE, "left", topics)[0]), (-90.0, read_bag(path, RANGE, "right", topics)[0])]
+    return np.vstack([np.insert(rows, 1, direction_deg, axis=1) for direction_deg, rows in both])
 
 
 def _ranges(file: TextIO) -> Floats:

@@ -6,7 +6,6 @@ In: `LegSamples`, `StrideSettings`. Out: `LegTrack`. Owns nothing. The estimator
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import write_csv
 from echostep.legs.heading import BIAS, Heading
 from echostep.legs.kinematics import USUAL_M, LegLengths
 from echostep.legs.stride import Flag, LegCounts, Stride, StrideSettings
@@ -224,13 +223,8 @@ FLAG_WORDS = {
 
 def write_leg_track(path: Path | str, track: LegTrack) -> None:
     """`TRACK_COLUMNS`, a row a sample (the paper's: ten a second); raises EchostepError when the file cannot be written."""
-    with (
-        as_error(f"{path}: cannot write the track"),
-        claim(Path(path)).open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(TRACK_COLUMNS)
-        writer.writerows([f"{v:.6f}" for v in row] for row in track.rows.tolist())
+    with as_error(f"{path}: cannot write the track"):
+        write_csv(Path(path), TRACK_COLUMNS, ([f"{v:.6f}" for v in row] for row in track.rows.tolist()))
 
 
 def describe_legs(track: LegTrack) -> str:

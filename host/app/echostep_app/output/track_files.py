@@ -7,7 +7,6 @@ suffix of the file name. Owns nothing.
 
 from __future__ import annotations
 
-import csv
 import math
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import claim, write_csv
 from echostep.localization import Estimate
 from echostep.plan import NO_PLAN, Plan
 from echostep.ports.chunks import Portion
@@ -100,10 +99,7 @@ def _record(recording: Recording, tracker: Tracker, out: Path, estimates: list[E
 
 def _write_csv(out: Path, track: TrackOnPlan) -> None:
     columns = flat(columns_of(track.estimates, track.plan))
-    with out.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    write_csv(out, list(columns), zip(*columns.values(), strict=True))
 
 
 def _write_parquet(out: Path, track: TrackOnPlan) -> None:

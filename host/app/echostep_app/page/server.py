@@ -33,7 +33,7 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.requests import MOST_REQUEST
 from echostep_app.page.session import PageSession
 from echostep_app.page.shared import PageCounts, Shared
-from echostep_app.page.web import users
+from echostep_app.page.web import access
 from echostep_app.page.web.access import LOOPBACK, AccessControl
 from echostep_app.page.web.addresses import page_urls
 from echostep_app.page.web.connections import Connections, GatedServer
@@ -93,7 +93,7 @@ class SocketServer(Generic[S]):
         self.sessions: set[S] = set()
         self._site, self._lang = site, address.lang
         self._listener = open_listener(address)
-        token = None if address.host in LOOPBACK and not users.has_other_users() else secrets.token_urlsafe(16)
+        token = None if address.host in LOOPBACK and not access.has_other_users() else secrets.token_urlsafe(16)
         host, port = self._listener.getsockname()[:2]
         self.urls = page_urls(host, port, token)  # the likeliest first
         self.connections = Connections(self._listener)

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.errors import EchostepError
 from echostep.plan import Georeference, Plan
 from echostep_app.extras import lacks, require
+from echostep_app.printing.lines import faults_of
 
 WGS84 = "EPSG:4326"
 FAR_M, EARTH_M = 1e4, 1e8  # larger coordinates are in a national grid; beyond that in none: twice around the Earth
@@ -80,7 +80,5 @@ def to_wgs84(name: str) -> Callable[[float, float], tuple[float, float]]:
 
 def earth_of(plan: Plan) -> EarthTransform | None:
     """The transform of a plan to longitude and latitude, None without a georeference or without pyproj; raises EchostepError when it is not valid."""
-    try:
+    with faults_of(f"plan {plan.name}"):
         return None if plan.georeference is None or lacks("it", "pyproj") else EarthTransform(plan.georeference)
-    except ValueError as error:
-        raise EchostepError(f"plan {plan.name}: {error}") from error

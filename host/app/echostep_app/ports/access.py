@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Whether this user may open a serial port, and which program has it already.
+"""Whether this user may open a serial port, which program has it already, and the USB serial number by which its device is found again.
 
-In: a port's path, /proc. Out: `Refusal`s, holders as text. Opens no port.
+In: a port's path, /proc, the system's list of ports. Out: `Refusal`s, holders as text, numbers. Opens no port.
 """
 
 from __future__ import annotations
@@ -12,6 +12,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import serial
+from serial.tools import list_ports
+
+try:
+    from termios import error as _terminal_error  # not an OSError; pyserial passes it on when a port goes away
+except ImportError:  # Windows has no termios
+    _terminal_error = OSError  # type: ignore[misc, assignment]
+
+PORT_FAULTS = (serial.SerialException, OSError, ValueError, NotImplementedError, _terminal_error)
+"""ValueError: a setting or a URL that pyserial refuses. NotImplementedError: a setting that a kind of URL lacks."""
 LONGEST_COMMAND = 60  # characters that are shown of a command
 # Services of Linux that open ports of others, by the name of their process, and how to end that.
 TAKERS = {
@@ -85,3 +95,15 @@ def _command(process: Path) -> str:
         if words:
             return words if len(words) <= LONGEST_COMMAND else f"{words[:LONGEST_COMMAND]}..."
     return (process / "comm").read_text().strip()
+
+
+def usb_number(port: str) -> str:
+    """The serial number of the device on a port; empty where it has none, or shares it with another one."""
+    device, seen = os.path.realpath(port), list_ports.comports()
+    number = next((each.serial_number or "" for each in seen if each.device == device), "")
+    return number if sum(each.serial_number == number for each in seen) == 1 else ""
+
+
+def port_of_number(number: str) -> str | None:
+    """The port of the device with this serial number; None while it is not plugged in."""
+    return next((each.device for each in list_ports.comports() if each.serial_number == number), None)

@@ -26,12 +26,19 @@ from serial import rfc2217
 
 from echostep.errors import EchostepError
 from echostep.ports.chunks import Chunk
-from echostep_app.ports.access import TAKERS, holders, is_url, refusal, taker_of
+from echostep_app.ports.access import (
+    PORT_FAULTS,
+    TAKERS,
+    holders,
+    is_url,
+    port_of_number,
+    refusal,
+    taker_of,
+    usb_number,
+)
 from echostep_app.ports.arrival_clock import now_ns
-from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.tcp import StandardInput, TcpPort
 from echostep_app.ports.udp import UdpPort
-from echostep_app.ports.usb_number import port_of_number, usb_number
 
 MOST_BYTES = 1 << 24  # of one port that wait: minutes of the board's or the MTx's bytes
 CHUNK_BYTES = 100  # approximate memory that a chunk takes besides its bytes

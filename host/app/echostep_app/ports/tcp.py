@@ -12,7 +12,7 @@ import socket
 from urllib.parse import urlsplit
 
 from echostep.errors import EchostepError
-from echostep_app.printing.lines import as_error
+from echostep_app.printing.lines import as_error, faults_of
 
 READ_TIMEOUT_S = 0.1  # the reading thread sees `close` in time
 CONNECT_TIMEOUT_S = 3.0
@@ -24,10 +24,8 @@ class TcpPort:
 
     def __init__(self, url: str, write_timeout_s: float) -> None:
         parts = urlsplit(url)
-        try:
+        with faults_of(url, "; expected socket://HOST:PORT"):
             host, port = parts.hostname, parts.port
-        except ValueError as error:
-            raise EchostepError(f"{url}: {error}; expected socket://HOST:PORT") from error
         if not host or port is None or parts.path or parts.query:
             raise EchostepError(f"{url}: expected socket://HOST:PORT, for instance socket://127.0.0.1:7011")
         with as_error(f"{url}: cannot connect", "; is ser2net, or what gives the port, running there?"):

@@ -19,6 +19,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from echostep.errors import EchostepError
 from echostep_app.ports.datagram_key import Opener, read_key
+from echostep_app.printing.lines import faults_of
 
 READ_TIMEOUT_S = 0.1  # the reading thread sees `close` in time
 LARGEST = 1472  # bytes of a datagram: one Ethernet frame; longer ones are dropped
@@ -125,10 +126,8 @@ class UdpPort:
 def _parse(url: str) -> tuple[str, int, Opener | None]:
     """Host, port and, with a key, the opener of the datagrams."""
     parts = urlsplit(url)
-    try:
+    with faults_of(url, "; expected udp://HOST:PORT"):
         host, port = parts.hostname, parts.port
-    except ValueError as error:
-        raise EchostepError(f"{url}: {error}; expected udp://HOST:PORT") from error
     if not host or port is None or parts.path:
         raise EchostepError(f"{url}: expected udp://HOST:PORT, for instance udp://127.0.0.1:9000")
     key = key_of(url)
@@ -138,10 +137,8 @@ def _parse(url: str) -> tuple[str, int, Opener | None]:
 def key_of(url: str) -> bytes | None:
     """The key that a URL names, None without one; raises EchostepError for anything else after the port, so that no key is left out by mistake."""
     parts = urlsplit(url)
-    try:
+    with faults_of(url, "; expected udp://HOST:PORT?key=FILE"):
         query = parse_qs(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query))
-    except ValueError as error:
-        raise EchostepError(f"{url}: {error}; expected udp://HOST:PORT?key=FILE") from error
     if parts.fragment or set(query) - {"key"} or len(query.get("key", ())) > 1:
         raise EchostepError(f"{url}: expected nothing behind the port but ?key=FILE")
     return read_key(Path(query["key"][0])) if query else None

@@ -52,6 +52,15 @@ def as_error(words: str, remedy: str = "") -> Iterator[None]:
         raise EchostepError(f"{words}: {error.strerror or error}{remedy}") from error
 
 
+@contextmanager
+def faults_of(what: object, remedy: str = "") -> Iterator[None]:
+    """A ValueError of the block becomes an EchostepError: what is wrong, the error's words, the remedy."""
+    try:
+        yield
+    except ValueError as error:
+        raise EchostepError(f"{what}: {error}{remedy}") from error
+
+
 def put_aside(path: Path, remedy: str) -> None:
     """Rename a file of this program that an earlier run left damaged, and say so; raises EchostepError where that fails. Nothing is deleted."""
     names = (path.with_name(f"{path.name}.damaged{number or ''}") for number in count())

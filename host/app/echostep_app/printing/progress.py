@@ -2,24 +2,22 @@
 """Progress on the terminal, wherever a command takes longer than a moment.
 
 In: the name of the work; how far it is. Out: a line that is redrawn on a terminal and vanishes at the end, or one plain line elsewhere. Owns nothing.
-`listening_bar` owns the thread that moves it.
 """
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from threading import Timer
 from typing import TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from echostep_app.printing.console import console
 
 SHOWN_AFTER_S = 2.0  # elsewhere than on a terminal: what ends before needs no line
+LEAST_SHARE = 1e-3  # by which a bar grows: items may be many
 Item = TypeVar("Item")
 
 
@@ -66,32 +64,3 @@ def bar(text: str, on: Console | None = None) -> Iterator[Callable[[float], None
     with Progress(*columns, console=on, transient=True) as bars:
         task = bars.add_task(text, total=None)
         yield lambda share: bars.update(task, total=1.0, completed=share)
-
-
-REDRAW_S = 0.1
-LEAST_SHARE = 1e-3  # by which a bar grows: items may be many
-
-
-@contextmanager
-def listening_bar(text: str, seconds: float, console: Console) -> Iterator[None]:
-    """Fill the bar in `seconds`, while the block runs."""
-    if not console.is_terminal:
-        yield
-        return
-    over = threading.Event()
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console, transient=True
-    ) as bars:
-        task, began_s = bars.add_task(text, total=seconds), time.monotonic()
-
-        def move() -> None:
-            while not over.wait(REDRAW_S):
-                bars.update(task, completed=min(time.monotonic() - began_s, seconds))
-
-        thread = threading.Thread(target=move, daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            over.set()
-            thread.join()

@@ -51,7 +51,6 @@ class Scorecard:
     availability: float
     latency_mean_s: float | None
     latency_p95_s: float | None
-    setup_s: float | None
     evaal_m: float
     evaal_knows_floors: bool
     ellipse95_holds: float | None
@@ -59,7 +58,7 @@ class Scorecard:
     protection_holds: float | None
 
 
-def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_s: float | None = None) -> Scorecard:
+def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None) -> Scorecard:
     """Compare a track with the truth; raises EchostepError where they have no moment in common."""
     at = match(track, truth)
     error = at.xy_m - at.true_xy_m
@@ -82,7 +81,7 @@ def score(track: ScoredPath, truth: ScoredPath, plan: Plan | None = None, setup_
         floor_probability=None if floors is None else _share(floors == 0.0, np.isfinite(floors)),
         zone_probability=None if plan is None else _zone_probability(at, plan),
         coverage=covered, availability=available,
-        latency_mean_s=latency.mean_m if latency else None, latency_p95_s=latency.p95_m if latency else None, setup_s=setup_s,
+        latency_mean_s=latency.mean_m if latency else None, latency_p95_s=latency.p95_m if latency else None,
         evaal_m=quantile(off_m + FLOOR_PENALTY_M * (0.0 if floors is None else np.nan_to_num(floors)), 0.75),
         evaal_knows_floors=floors is not None,
         ellipse95_holds=_ellipse_holds(track, at, error), radius95_holds=_holds(radius, off_m),

@@ -70,7 +70,6 @@ METRICS: tuple[Metric, ...] = (
     ),
     Metric("latency, mean", "s", f"{ISO}, 8.14", "from the moment of a row until it was out", lambda c: c.latency_mean_s),
     Metric("latency, 95 %", "s", f"{ISO}, 8.14", "95 % of the latencies are below it", lambda c: c.latency_p95_s),
-    Metric("set-up time", "s", f"{ISO}, 8.15", "as given on the command line", lambda c: c.setup_s),
     Metric(
         "EvAAL score", "m", EVAAL, f"third quartile of horizontal error + {FLOOR_PENALTY_M:g} m per wrong floor",
         lambda c: c.evaal_m,

@@ -31,7 +31,7 @@ from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, Part, compile_
 from echostep_app.output.terminal import TerminalView
 from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.mailbox import popped
-from echostep_app.plan.places.refusals import refusals
+from echostep_app.plan.places.findings import refusals
 from echostep_app.plan.routing import EXIT
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output

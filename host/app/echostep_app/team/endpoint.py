@@ -12,6 +12,7 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from echostep.errors import EchostepError
 from echostep_app.extras import require
+from echostep_app.printing.lines import faults_of
 from echostep_app.team.messages.report import checked_name
 
 PORTS = {"mqtt": 1883, "mqtts": 8883, "cot+udp": 6969, "cot+tcp": 8087, "cot+tls": 8089}
@@ -45,12 +46,10 @@ class Endpoint:
 def parse_endpoint(url: str, schemes: tuple[str, ...] = tuple(PORTS)) -> Endpoint:
     """A URL such as mqtts://user:password@host:8883?ca=ca.pem&cert=me.pem&key=me.key; raises EchostepError."""
     shown = url.rpartition("@")[2]
-    try:
+    with faults_of(f"{shown}: not an address"):
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
         asked = parse_qs(parts.query, strict_parsing=True) if parts.query else {}
-    except ValueError as error:
-        raise EchostepError(f"{shown}: not an address: {error}") from error
     if parts.scheme in schemes:
         require(shown, PACKAGES[parts.scheme])
     if parts.scheme not in schemes:

@@ -18,6 +18,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
+import numpy as np
+
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
 from echostep.odometry import WearerWatch
@@ -26,19 +28,20 @@ from echostep.path import Odometer
 from echostep.plan import Level, Plan
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import all_findings
+from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.places.bearing import KNOWN_HEADING_RAD
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.lines import moment
 from echostep_app.team.age import aged, no_better
 from echostep_app.team.cot import StreamTransport, UdpTransport
 from echostep_app.team.endpoint import BROKERS, Endpoint, Outlet
-from echostep_app.team.georeference import GroundPlane
 from echostep_app.team.messages.report import (
     WITHOUT_PLAN,
     Motion,
     Position,
     Report,
     ReportedAlarm,
+    ReportedPlace,
     StreamReport,
     printable,
 )
@@ -275,3 +278,24 @@ def _transport(endpoint: Endpoint, plan: Plan, outlet: Outlet, run: str) -> Tran
             f"{endpoint}: TAK needs latitude and longitude, and the plan has no georeference: add one to the plan, or use mqtt://"
         )
     return UdpTransport(endpoint) if endpoint.scheme == "cot+udp" else StreamTransport(endpoint)
+
+
+class GroundPlane:
+    """Transforms positions on a georeferenced plan to WGS 84."""
+
+    def __init__(self, plan: Plan) -> None:
+        """Raises ValueError when the plan has no georeference that can be used."""
+        if plan.georeference is None:
+            raise ValueError("the plan has no georeference")
+        self._rotation_rad = plan.georeference.rotation_rad
+        self._uncertainty_m = plan.uncertainty_m or 0.0
+        self._earth = EarthTransform(plan.georeference)
+
+    def place(self, x_m: float, y_m: float, sd_m: float, heading_rad: float | None) -> ReportedPlace:
+        """A position on the plan, on Earth.
+
+        `sd_m` is combined with the plan's uncertainty. The height stays unknown: a plan's heights do not refer to the ellipsoid.
+        """
+        ((lon, lat),) = self._earth.degrees(np.array([[x_m, y_m]]))
+        course = None if heading_rad is None else (90.0 - math.degrees(heading_rad + self._rotation_rad)) % 360.0
+        return ReportedPlace(float(lat), float(lon), None, math.hypot(sd_m, self._uncertainty_m), None, course)

@@ -138,12 +138,12 @@ class FootEvents:
 
 
 class Foot:
-    """Live processing; equal samples give the same events, bit for bit, in blocks of any size."""
+    """Live processing; equal samples give the same events, bit for bit, in blocks of any size. `nav`: the state after the newest sample."""
 
     def __init__(self, settings: FootSettings | None = None, noise: ins.Noise | None = None) -> None:
         self._zupt = np.zeros(1, zupt_state.ZUPT_STATE)
         self._zupt["height_m"] = (settings or FootSettings()).height_m
-        self._nav = ins.new_nav(noise or ins.Noise())
+        self.nav = ins.new_nav(noise or ins.Noise())
         self._window = stance.new_window()
         self._sums = stance.new_zaru_sums()
         self._compass = new_compass()
@@ -156,13 +156,13 @@ class Foot:
     @property
     def position_m(self) -> tuple[float, float, float]:
         """Position in the walk frame."""
-        x, y, z = self._nav.position.tolist()
+        x, y, z = self.nav.position.tolist()
         return x, y, z
 
     @property
     def heading_rad(self) -> float:
         """Yaw in the walk frame."""
-        return float(ins.heading(self._nav))
+        return float(ins.heading(self.nav))
 
     @property
     def compass(self) -> tuple[int, int]:
@@ -199,7 +199,7 @@ class Foot:
                 f"samples of shapes {t_s.shape}, {accel.shape}, {gyro.shape}; expected (n,), (n, 3), (n, 3), mag as gyro"
             )
         events = np.zeros((zupt_state.EVENTS_PER_SAMPLE * len(t_s), zupt_state.EVENT_SIZE))
-        state = zupt_state.ZuptInsState(self._zupt[0], self._nav, self._window, self._sums, self._compass)
+        state = zupt_state.ZuptInsState(self._zupt[0], self.nav, self._window, self._sums, self._compass)
         output = zupt_state.Output(events, rows, np.zeros(1, np.int64))
         zupt_ins.process(state, zupt_state.Samples(t_s, accel, gyro, mag), output)
         return [_event(row) for row in events[: output.written[0]]]

@@ -7,7 +7,6 @@ EchostepError; the track as CSV and in words. Owns nothing. `imu_checks` holds t
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import write_csv
 from echostep.foot.alignment import aligned
 from echostep.foot.steps import Stance, Step, Track, walk_track
 from echostep.foot.trunk_path import RUN_STANCE_S
@@ -81,12 +80,8 @@ def _table(lines: Iterator[str], read_header: HeaderReader) -> tuple[Floats, tup
 def write_foot_track(path: Path | str, track: Track) -> None:
     """`t_s,x,y,z,heading_rad,stance` for every sample; raises EchostepError when the file cannot be written."""
     try:
-        with claim(Path(path)).open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(TRACK_COLUMNS)
-            columns = (track.t_s, *track.position_m.T, track.heading_rad)
-            rows = zip(*columns, track.stance, strict=True)
-            writer.writerows([*(f"{v:.6f}" for v in row), int(still)] for *row, still in rows)
+        rows = zip(track.t_s, *track.position_m.T, track.heading_rad, track.stance, strict=True)
+        write_csv(Path(path), TRACK_COLUMNS, ([*(f"{v:.6f}" for v in row), int(still)] for *row, still in rows))
     except OSError as error:
         raise EchostepError(f"{path}: cannot write the track: {error.strerror}") from error
 

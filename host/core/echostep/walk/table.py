@@ -6,7 +6,6 @@ In: estimates, a plan. Out: columns by name; a CSV file. Owns the names of the c
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from echostep.additions import added
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import write_csv
 from echostep.localization import Estimate
 from echostep.plan import Plan
 
@@ -51,8 +50,5 @@ def refuse_none(estimates: list[Estimate], path: Path) -> None:
 
 def write_track(path: Path, estimates: Sequence[Estimate]) -> None:
     """Write estimates as CSV; numbers read back to the same bits."""
-    with claim(path).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([*COLUMNS, HYPOTHESES])
-        for e in estimates:
-            writer.writerow([*(getattr(e, name) for name in COLUMNS), " ".join(map(str, e.hypotheses))])
+    rows = ([*(getattr(e, name) for name in COLUMNS), " ".join(map(str, e.hypotheses))] for e in estimates)
+    write_csv(path, [*COLUMNS, HYPOTHESES], rows)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Openings that a ranger saw through while it was carried past: cells of a line that are open, a door's width about them."""
+"""Openings that a ranger saw through while it was carried past; ends of drawn walls where they meet others."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep_app.mapping.walls.evidence import CROSSED, DOOR_M, add_sights, cell_counts
+from echostep_app.mapping.walls.evidence import CELL_M, CROSSED, DOOR_M, Cells, add_sights, cell_counts
 from echostep_app.mapping.walls.lines import Lines
-from echostep_app.mapping.walls.segments import ANY, find_runs
+from echostep_app.mapping.walls.segments import ANY, Run, find_runs, segments_of
 
 WALL = Lines(np.array([math.pi / 2]), np.array([1.0]), np.zeros(1), np.zeros(1), np.full(1, 8.0), np.ones(1, np.bool_))
 AWAY_M, ROOM_M = 1.0, 4.5  # of the wall from the path; of what stands behind it
@@ -72,3 +72,39 @@ def test_cells_that_a_path_crossed_are_left_alone() -> None:
     before = cells.heard.copy()
     add_sights(WALL, poses, np.array([ROOM_M]), one, cells)
     assert np.array_equal(cells.heard, before)
+
+
+CELLS = 500
+
+
+def _segments(lines: list[tuple[float, float]], runs: list[Run]) -> list[list[float]]:
+    """Ends (n, 4) of runs on lines (normal in radians, distance in metres) that no ping passed."""
+    normal, rho = np.array(lines).T
+    none, count = np.zeros(len(lines)), len(lines)
+    cells = Cells(
+        np.zeros((count, CELLS)),
+        np.zeros((count, CELLS)),
+        none - CELLS * CELL_M / 2.0,
+        np.full(count, CELLS),
+        np.zeros(0, np.intp),
+    )
+    found = segments_of(Lines(normal, rho, none, none, none, none == 0.0), runs, cells)
+    ends: list[list[float]] = found.tolist()
+    return ends
+
+
+@pytest.mark.parametrize("apart_m", [-0.03, 0.03])
+def test_a_wall_ends_at_the_one_that_stands_there(apart_m: float) -> None:
+    """Not at another on nearly the same line, that begins 1.5 m farther along it, on either side."""
+    across, along = math.pi / 2.0, 0.0
+    runs = [Run(0, 1.0, 4.0, 50.0), Run(1, -2.0, 5.0, 50.0), Run(2, -9.0, -1.5, 50.0)]
+    (wall, *_) = _segments([(along, 0.0), (across, 0.9), (across, 0.9 + apart_m)], runs)
+    assert min(wall[1], wall[3]) == pytest.approx(0.9)
+
+
+def test_a_wall_alone_is_extended_to_the_line_of_the_next() -> None:
+    """A corner that neither wall was heard up to."""
+    runs = [Run(0, 1.0, 4.0, 50.0), Run(1, -6.0, -1.0, 50.0)]
+    (wall, other) = _segments([(0.0, 0.0), (math.pi / 2.0, 0.2)], runs)
+    assert min(wall[1], wall[3]) == pytest.approx(0.2)
+    assert min(abs(other[0]), abs(other[2])) == pytest.approx(0.0, abs=1e-9)

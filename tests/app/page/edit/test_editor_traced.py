@@ -12,7 +12,7 @@ from echostep.plan import Plan, load_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
+from echostep_app.plan.importers.report import Hints
 from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import find_spaces
 from echostep_app.plan.questions import with_questions

@@ -17,9 +17,9 @@ import pytest
 from rich.console import Console
 
 from echostep_app.page.server import Address
-from echostep_app.page.web import addresses, users
+from echostep_app.page.web import access, addresses
+from echostep_app.page.web.access import has_other_users
 from echostep_app.page.web.addresses import HALVES, own_addresses, page_urls, print_page, qr_code
-from echostep_app.page.web.users import has_other_users
 from page.frames import fetched, served
 
 URL = "http://192.168.1.20:8420/AbCdEfGhIjKlMnOpQrStUv/"
@@ -102,7 +102,7 @@ def test_a_person_with_a_shell_is_another_user(
 
 @pytest.mark.parametrize("several", [True, False])
 def test_a_computer_of_several_users_asks_for_the_token(monkeypatch: pytest.MonkeyPatch, several: bool) -> None:
-    monkeypatch.setattr(users, "has_other_users", lambda: several)
+    monkeypatch.setattr(access, "has_other_users", lambda: several)
     with served() as (server, _):
         assert server.url.startswith("http://127.0.0.1:")
         assert (server.url.count("/") == 4) == several

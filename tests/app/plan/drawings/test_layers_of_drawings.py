@@ -18,8 +18,7 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.importers.dxf.layers import LAYERS, meaning, patterns_of
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from plan.drawings.drawn_houses import WALL, boxes, corners, house, outlines, sheet
 
 

@@ -15,8 +15,7 @@ from echostep.errors import EchostepError
 from echostep_app.commands.options import scale_of as scale_option
 from echostep_app.plan.importers.dxf.frame import METRES
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import size_m
 from plan.drawings.drawn_houses import WALL, house, sheet
 

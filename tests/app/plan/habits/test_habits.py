@@ -21,8 +21,7 @@ from pyproj import Transformer
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import summary
 from plan.drawings import drawn_offices as offices
 from plan.habits import drawn_house as dxf

@@ -18,8 +18,8 @@ import serial
 
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.limited import open_limited
+from echostep_app.ports.access import PORT_FAULTS
 from echostep_app.ports.datagram_key import seal
-from echostep_app.ports.port_faults import PORT_FAULTS
 from echostep_app.ports.udp import key_of
 from echostep_app.printing.console import console
 from echostep_app.scorecard.track_columns import load_path

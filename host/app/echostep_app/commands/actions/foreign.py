@@ -30,7 +30,7 @@ BEGINNINGS = {  # of files [their specifications; file(1)]
     b"\x0a\x0d\x0d\x0a": PACKETS,  # pcapng
     b"\x89PNG": PICTURE, b"\xff\xd8\xff": PICTURE,
     b"%PDF": "a PDF: echostep plan import FILE says how it becomes a plan",
-    b"SQLite format 3": "a database (SQLite), as of a GeoPackage or a bag of ROS 2: convert a bag to MCAP (ros2 bag convert)",
+    b"SQLite format 3": "a database (SQLite), as of a GeoPackage or a bag of ROS 2: echostep import FILE -o walk.mcap reads a bag",
     b"#ROSBAG V2": "a bag of ROS 1: convert it (mcap convert FILE OUT.mcap)",
 }  # fmt: skip
 TABLES = {  # columns that such a table has, and what it is

@@ -22,7 +22,7 @@ from echostep_app.mapping.mapper import Mapped, map_walk
 from echostep_app.mapping.picture import draw_picture
 from echostep_app.mapping.plan import plan_of
 from echostep_app.mapping.walls.place_sd import OFF_M
-from echostep_app.plan.places.refusals import refusals
+from echostep_app.plan.places.findings import refusals
 from echostep_app.plan.writer import save_plan
 from echostep_app.printing.lines import say
 from echostep_app.printing.progress import bar, with_bar

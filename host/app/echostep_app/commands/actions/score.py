@@ -46,7 +46,6 @@ def score(
     tracks: Sequence[Path],
     truth: Path | None,
     tracking: TrackingOptions,
-    setup_s: float | None,
     *,
     taps: bool,
     as_json: bool,
@@ -55,7 +54,7 @@ def score(
     plan = open_limited(tracking.plan_path) if tracking.plan_path else None
     compared = (_with_taps if taps else _with_truth)(tracks, truth, plan, tracking)
     say(*([] if as_json else compared.words))
-    cards = [score_track(track, true, plan, setup_s) for track, true in compared.pairs]
+    cards = [score_track(track, true, plan) for track, true in compared.pairs]
     if as_json:
         json.dump(_tree(cards, compared.truth, plan), sys.stdout, indent=1)
         sys.stdout.write("\n")

@@ -6,7 +6,6 @@ In: text, `HeightRecord`, `Floors`. Out: heights, a CSV file, visits and climbs.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
-from echostep.file_mode import claim
+from echostep.file_mode import write_csv
 from echostep_app.offline.floors.floors import CLIMBING, Floors
 from echostep_app.offline.floors.stays import HeightRecord
 from echostep_app.printing.lines import as_error
@@ -127,10 +126,6 @@ def describe(floors: Floors, record: HeightRecord) -> str:
 def write_floors(path: Path, floors: Floors) -> None:
     """COLUMNS for every sample; raises EchostepError when the file cannot be written."""
     columns = (floors.t_s, floors.floor, floors.probability, floors.height_m)
-    with as_error(f"{path}: cannot write the floors"), claim(path).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows(
-            [f"{t:.6f}", k, f"{p:.4f}", f"{h:.3f}"]
-            for t, k, p, h in zip(*(each.tolist() for each in columns), strict=True)
-        )
+    rows = zip(*(each.tolist() for each in columns), strict=True)
+    with as_error(f"{path}: cannot write the floors"):
+        write_csv(path, COLUMNS, ((f"{t:.6f}", k, f"{p:.4f}", f"{h:.3f}") for t, k, p, h in rows))

@@ -19,6 +19,8 @@ from echostep.arrays import Bools, Floats, Ints
 from echostep.offline.csv_table import MOST_BAD, CsvLimits, lines_of, open_samples
 from echostep.ports.imu_samples import rate_complaint
 from echostep_app.offline.foreign_columns import ADVICE, OWN, UNITS, Naming, read_header
+from echostep_app.offline.ros_bag import FLUID_PRESSURE, is_bag, read_bag
+from echostep_app.printing.lines import faults_of
 
 COLUMNS = ("t_s", "pressure_pa")
 TEMPERATURE = "temperature_c"
@@ -62,7 +64,11 @@ class PressureRecord:
 
 
 def load_pressures(path: Path | str, naming: Naming = OWN) -> PressureRecord:
-    """Samples of a CSV file; raises EchostepError that names the file, the line and the field."""
+    """Samples of a CSV file or a bag; raises EchostepError that names the file, the line and the field."""
+    if is_bag(Path(path)):
+        rows, notes = read_bag(Path(path), FLUID_PRESSURE, "pressure", naming)
+        with faults_of(path):
+            return _checked(np.insert(rows, AIR_TEMPERATURE, np.nan, axis=1), np.arange(1, len(rows) + 1), notes)
     return open_samples(path, lambda file: _checked(*_table(lines_of(file, LIMITS), naming)))
 
 

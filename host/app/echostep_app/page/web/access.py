@@ -8,12 +8,17 @@ several users, the address contains a random token, and requests without it are 
 
 Behind a proxy the page's own address may begin with https, and is in `X-Forwarded-Host` where the proxy puts its target into `Host`: a page of
 another site cannot set that header for a socket. Pages refused for their address are reported, because a proxy may be the reason.
+
+Every user of a computer reaches its loopback interface. Where one person alone can log in, the page's address stays short, and fixed for a proxy.
+Accounts that are only listed on request (LDAP) are not seen: give `--host` there.
 """
 
 from __future__ import annotations
 
 import hmac
+import os
 from collections.abc import Callable
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -36,6 +41,9 @@ SECURITY_HEADERS = {
 
 MOST_TOLD = 4  # addresses that are reported; a hostile page may invent others
 SAID_CHARACTERS = 100  # of an address
+# Accounts of people [login.defs(5), UID_MIN and UID_MAX by default]; no shell: a service
+PEOPLE = range(1000, 60_001)
+NO_SHELLS = ("nologin", "false", "sync")
 
 
 class AccessControl:
@@ -127,3 +135,16 @@ def _host_name(host: str) -> str | None:
         return urlsplit(f"//{host}").hostname
     except ValueError:
         return None
+
+
+def has_other_users() -> bool:
+    """Whether an account of another person than this process's user has a shell; where accounts cannot be listed (Windows), no."""
+    try:
+        import pwd
+    except ImportError:
+        return False
+    own = os.getuid()
+    return any(
+        entry.pw_uid in PEOPLE and entry.pw_uid != own and Path(entry.pw_shell).name not in NO_SHELLS
+        for entry in pwd.getpwall()
+    )

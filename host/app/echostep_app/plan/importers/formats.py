@@ -16,9 +16,8 @@ from typing import Any
 
 from echostep.errors import EchostepError
 from echostep.plan import Plan
-from echostep_app.plan.importers.hints import Hints
 from echostep_app.plan.importers.parsing import FORMATS, GML
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.storey_names import in_order
 from echostep_app.plan.writer import plan_json
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from echostep.errors import EchostepError
 from echostep.plan import Plan, load_plan, parse_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.writer import plan_json
 
 # Assumed: ten times the need of the largest plan that was tried.

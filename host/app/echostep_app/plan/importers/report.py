@@ -1,12 +1,33 @@
 # SPDX-License-Identifier: MIT
-"""Results of an import besides the plan: units, layers, elements left out, doubts.
+"""An import besides the plan: what the person says beforehand, and the units, layers, elements left out and doubts that come out.
 
-In: notes of an importer. Out: `ImportReport`. Owns nothing. `summary` makes the text that a person reads.
+In: options; notes of an importer. Out: `Hints`, `ImportReport`. Owns the usual height of a storey. `summary` makes the text that a person reads.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+
+STOREY_HEIGHT_M = 3.5  # from level to level, for formats without heights: a usual storey
+
+
+@dataclass(frozen=True, slots=True)
+class Hints:
+    """`storey_height_m` where the file has no heights; `doors_m`: width of doors that are to be assumed (IMDF).
+
+    For drawings: `units`; `scale_m`, metres a unit, instead of units; patterns of `layers` by kind; `windows` (x0, y0, x1, y1 in drawing units), each
+    a level, the lowest first; `level_names`; `align`: lay the levels over each other.
+    """
+
+    storey_height_m: float = STOREY_HEIGHT_M
+    units: str | None = None
+    layers: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    doors_m: float | None = None
+    scale_m: float | None = None
+    windows: Sequence[Sequence[float]] = ()
+    level_names: Sequence[str] = ()
+    align: bool = False
 
 
 @dataclass(slots=True)

@@ -25,7 +25,7 @@ from echostep.plan import Plan
 from echostep_app.plan.cropping import Bounds, extent
 from echostep_app.plan.georeference import EarthTransform
 from echostep_app.plan.pictures.drawing import draw_bare_level
-from echostep_app.printing.lines import as_error
+from echostep_app.printing.lines import as_error, faults_of
 
 KML = "http://www.opengis.net/kml/2.2"
 PIXELS_PER_M, MOST_PX = 40.0, 4096  # a door is 36 pixels wide; the largest texture of older phones
@@ -63,10 +63,8 @@ def overlays(plan: Plan) -> list[Overlay]:
         raise EchostepError(
             f"plan {plan.name}: an overlay needs a georeference: add longitude and latitude of the map's origin to the plan"
         )
-    try:
+    with faults_of(f"plan {plan.name}"):
         earth = EarthTransform(replace(plan.georeference, rotation_rad=0.0))
-    except ValueError as error:
-        raise EchostepError(f"plan {plan.name}: {error}") from error
     turned = north_up(plan)
     walled = [k for k, level in enumerate(turned.levels) if len(level.solid)]
     if not walled:

@@ -28,9 +28,9 @@ from echostep.xsens.reader import warm_up
 from echostep_app.board.subscription import BoardSubscription
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import SEARCH, TRACKING
+from echostep_app.ports.access import usb_number
 from echostep_app.ports.arrival_clock import SleepWatch, now_ns
 from echostep_app.ports.serial_ports import SerialPorts, check_different
-from echostep_app.ports.usb_number import usb_number
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.lines import put_aside
 from echostep_app.printing.people import outlast_output

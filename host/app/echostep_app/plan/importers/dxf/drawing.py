@@ -50,8 +50,7 @@ from echostep_app.plan.importers.dxf.symbols import (
     symbols_of,
     with_leaf,
 )
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.straight import pieces_of
 
 HALF_TREAD_M = 0.3  # half the greatest distance between neighbouring lines of one staircase: a tread

@@ -26,8 +26,7 @@ from echostep_app.plan.importers.dxf.layers import BESIDE, WAYS, faces_m, matche
 from echostep_app.plan.importers.dxf.measures import lengths_of
 from echostep_app.plan.importers.dxf.storeys import bounds_of, drawn_over, has_room, window_words
 from echostep_app.plan.importers.dxf.units import likely_unit, scale_of, stated_unit
-from echostep_app.plan.importers.hints import Hints
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.storey_names import StoreyName, storey_of
 
 MOST_MORE = 3.0  # ratio of wall-like lines on other layers to the walls used, from which the import asks; assumed

@@ -30,6 +30,7 @@ from echostep_app.plan.importers.imdf.assumed_doors import ASSUMED, ONE_LINE_M, 
 from echostep_app.plan.importers.parsing import number, parse_json, text
 from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.straight import pieces_of
+from echostep_app.printing.lines import faults_of
 
 OPEN = {
     "walkway", "walkway.island", "unenclosedarea", "platform", "road", "footbridge", "movingwalkway", "lobby", "waitingroom",
@@ -151,15 +152,13 @@ def _origin(archive: Archive) -> Georeference:
     """The plan's origin: the first corner of the first level, rounded to 1e-5 degrees (about 1 m)."""
     name = _file(archive, "level")
     tree = parse_json(archive.text(name), archive.label(name))
-    try:
+    with faults_of(archive.label(name)):
         for where, feature in features(tree):
             for _, place, _ in geometries(feature, where):
                 while isinstance(place, list) and place:
                     place = place[0]
                 if isinstance(place, tuple):
                     return Georeference(round(place[0], 5), round(place[1], 5))
-    except ValueError as error:
-        raise EchostepError(f"{archive.label(name)}: {error}") from error
     raise EchostepError(f"{archive.label(name)}: it has no levels with a place: export the archive with its levels")
 
 
@@ -169,23 +168,19 @@ def _features(archive: Archive, kind: str, earth: EarthTransform) -> list[Featur
     if not archive.has(name):
         return []
     read = []
-    try:
+    with faults_of(archive.label(name)):
         for where, feature in features(parse_json(archive.text(name), archive.label(name))):
             place = f"{kind} {where}"
             about = properties(feature, where)
             key = label(feature.get("id", about.get("id")), f"{where}.id") or place
             read.append(Feature(place, key, about, shape(feature, where, earth)))
             _ = read[-1].category, read[-1].name, read[-1].level
-    except ValueError as error:
-        raise EchostepError(f"{archive.label(name)}: {error}") from error
     return read
 
 
 def _ordinal(level: Feature) -> float:
-    try:
+    with faults_of("level.geojson"):
         return number(level.about.get("ordinal"), f"{level.where}.properties.ordinal", 500.0, "storeys")
-    except ValueError as error:
-        raise EchostepError(f"level.geojson: {error}") from error
 
 
 def _by_level(features: list[Feature], levels: dict[str, DrawnLevel], report: ImportReport) -> dict[str, list[Feature]]:

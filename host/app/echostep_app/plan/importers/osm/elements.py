@@ -23,6 +23,7 @@ from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep_app.plan.importers.osm.geojson_rows import geojson_rows, without_names
 from echostep_app.plan.importers.parsing import FORMATS, GML, number, parse_json, read_text, typed
+from echostep_app.printing.lines import faults_of
 
 RANGE = re.compile(r"^(-?\d+(?:\.\d+)?)\s*-\s*(-?\d+(?:\.\d+)?)$")
 MOST = 300  # greatest level number, and most levels in a range
@@ -122,14 +123,12 @@ def rings(ways: list[list[int]]) -> list[list[int]]:
 def read_osm(path: Path) -> Elements:
     """Read the elements of a file; raises EchostepError that names the file and the element."""
     text = read_text(path)
-    try:
+    with faults_of(path):
         rows = _json_rows(text, path) if text.lstrip()[:1] == "{" else _xml_rows(text)
         elements = Elements()
         for row in rows:
             _add(elements, row)
         _resolve(elements)
-    except ValueError as error:
-        raise EchostepError(f"{path}: {error}") from error
     return elements
 
 
