@@ -38,6 +38,7 @@ def repair(path: Path, out: Path) -> list[str]:
     """Write everything readable of a recording to a complete file; raises EchostepError when no message is readable."""
     recovery, saved = Recovery(path), Contents()
     with RewrittenRecording(out, path, recovery.schemas) as rewritten:
+        recovery.keep_private = rewritten.keep_private
         messages = with_progress(recovery, saved, f"repairing {path.name}")
         _copy(messages, rewritten, saved, lambda: recovery.metadata)
         if not saved.ports and not saved.derived:

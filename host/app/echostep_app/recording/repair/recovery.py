@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, compress, islice
 from pathlib import Path
@@ -27,7 +27,16 @@ from echostep.recording import MCAP_MAGIC, is_being_written
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import CHUNK, begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
+from echostep.recording.damage.scan import (
+    CHUNK,
+    CHUNK_HEAD,
+    PRIVATE,
+    begin_in_chunk,
+    chunk_matches,
+    map_file,
+    next_valid_run,
+    record_end,
+)
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     DAMAGE_NAME,
@@ -71,6 +80,7 @@ class Recovery:
     misnamed: set[str] = field(default_factory=set)  # topics of channels whose name or encoding is damaged
     library: str = ""  # by which the file was written
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
+    keep_private: Callable[[int, bytes], None] = lambda _opcode, _body: None  # called with other programs' own records
     size: int = 0  # of the file, bytes
     byte_offset: int = 0  # of the record that was read last
     _is_channel: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))  # by channel number
@@ -172,7 +182,7 @@ class Recovery:
         self.own_damage.unreadable_chunks += not whole
 
     def _register(self, opcode: int, body: bytes) -> None:
-        """Keep a channel, a schema, the recorder's name and its metadata; ignore other records."""
+        """Keep a channel, a schema, the recorder's name and its metadata, and what other programs keep; ignore other records."""
         if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
             if self._settled and channel.id in self.channels:
                 return
@@ -189,6 +199,11 @@ class Recovery:
                 self.metadata = dict(stored.metadata)
             elif stored.name == DAMAGE_NAME:
                 self.before = list(stored.metadata.values())
+        elif opcode >= PRIVATE and (opcode, body) != (
+            PRIVATE,
+            bytes(CHUNK_HEAD - HEAD_SIZE),
+        ):  # the place of an open chunk
+            self.keep_private(opcode, body)
 
 
 MOST_WAITING = 4096  # messages: some seconds of a walk, while another port is silent
