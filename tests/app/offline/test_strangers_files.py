@@ -45,6 +45,12 @@ def filled(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def stamped(rows: np.ndarray) -> np.ndarray:
+    """Ten single stamps that are late, or early, by a second, and not by whole periods."""
+    rows[300:1300:100, 0] += np.where(np.arange(10) % 2, 1.004, -1.004)
+    return rows
+
+
 def dot(rows: np.ndarray) -> np.ndarray:
     """Movella DOT's, without the lines above the names; its microseconds wrap."""
     clock = (np.round(1e6 * rows[:, 0]) + (1 << 32) - 5e6) % (1 << 32)
@@ -59,6 +65,7 @@ OURS, DOT = (
 
 @pytest.mark.parametrize(("spoil", "names", "form", "says"), [
     (filled, OURS, "%.9g", r"2\d rows without a number in some column: skipped"),
+    (stamped, OURS, "%.9g", r"10 times are out of line with their neighbours': skipped"),
     (lambda rows: np.column_stack([1e-6 * dot(rows)[:, 0], rows[:, 1:]]), OURS, "%.9f", "12 steps"),
     (dot, DOT, "%.12g", "read as an export of Movella DOT"),
     (lambda rows: rows, OURS, '"%.6f"', "12 steps"),
