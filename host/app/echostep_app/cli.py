@@ -18,7 +18,7 @@ import typer
 from echostep.errors import EchostepError, IncompleteError, words_of
 from echostep.file_mode import share_files
 from echostep_app.commands import beacons, commander, files, hardware, plan, recordings, runs
-from echostep_app.commands.former import former_use
+from echostep_app.commands.former import former_use, piped
 from echostep_app.commands.studies import add_studies
 from echostep_app.extras import EXTRAS, lacks
 from echostep_app.interruption import end_by_signals, is_asked
@@ -82,7 +82,7 @@ def main() -> None:
 def _status() -> int:
     """The exit status of the command, which is run."""
     try:
-        if words := former_use(sys.argv[1:]):
+        if words := former_use(sys.argv[1:]) or piped(sys.argv[1:]):
             raise EchostepError(words)
         app()
     except SystemExit as end:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.errors import words_of
 from echostep.offline.imu_csv import COLUMNS
 from foot.foot_walks import walking
 from needs_data import data_or_skip
@@ -93,10 +95,17 @@ def test_held_rows_are_missing_and_a_clock_tells_the_time(
     assert says in (said := echostep("foot", "imu.txt", cwd=tmp_path, ends=0)).stderr + said.stdout
 
 
-@pytest.mark.parametrize("command", ["foot", "legs"])
-def test_a_pipe_is_named_before_it_is_waited_for(command: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["foot", "legs", "plan import", "plan check", "replay", "info"])
+@pytest.mark.parametrize("name", ["pipe", "-"])
+def test_a_pipe_is_named_before_it_is_waited_for(command: str, name: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    assert "pipe: no file, but a folder, pipe or device" in echostep(command, "pipe", cwd=tmp_path, ends=2).stderr
+    said = echostep(*command.split(), name, cwd=tmp_path, ends=2).stderr
+    assert said == f"echostep: {name}: a pipe cannot be read twice: write it to a file, and give that\n"
+
+
+def test_where_no_file_can_be_opened_no_package_is_named() -> None:
+    error = OSError(errno.EMFILE, os.strerror(errno.EMFILE), "site-packages/numba/context.py")
+    assert words_of(error) == "Too many open files: end what has them open, or allow more (ulimit -n 1024)"
 
 
 @pytest.mark.process

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Command lines with removed commands or options: answered by the table `echostep.errors.INSTEAD`.
+"""Command lines that no command takes: with removed commands or options, answered by the table `echostep.errors.INSTEAD`; with a pipe as a file.
 
 In: the words of a command line. Out: a sentence; empty for a command line of today. Owns nothing.
 """
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
 
 from echostep.errors import INSTEAD, has_left
 
@@ -16,6 +19,18 @@ def former_use(words: Sequence[str]) -> str:
     given = (word.replace("=", " ", 1) if word.startswith("--") else word for word in words if word != "--share")
     line = f" {' '.join(given)} "
     return next((has_left(use) for use in INSTEAD if _is_used(use, line)), "")
+
+
+def piped(words: Sequence[str]) -> str:
+    """The sentence about the first pipe in place of a file, which commands read several times; empty where there is none."""
+    pipe = next((word for word in words if word == "-" or _is_pipe(word)), "")
+    return f"{pipe}: a pipe cannot be read twice: write it to a file, and give that" if pipe else ""
+
+
+def _is_pipe(word: str) -> bool:
+    with suppress(OSError, ValueError):
+        return stat.S_ISFIFO(Path(word).stat().st_mode)
+    return False
 
 
 def _is_used(use: str, line: str) -> bool:
