@@ -18,6 +18,7 @@ PicoQuake: docs/acquisition_data.md of github.com/PLab-SI/PicoQuake.
 from __future__ import annotations
 
 import csv
+import math
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -155,8 +156,16 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     names = _renamed(theirs, columns) if columns else names
     factors = _factors(names, titled, units)
-    advice = ("" if naming.columns else proposal(theirs, titled, first, counted=counted)) or ADVICE
+    advice = ("" if naming.columns else proposal(theirs, titled, first, counted=counted)) or _kinds(begin, separator)
     return Header(names, separator, line, factors, counts_hz, period, notes, advice, tuple(begin))
+
+
+def _kinds(begin: list[str], separator: str) -> str:
+    """The advice for lines that begin with the kind of their numbers, else that for names that are not known."""
+    kinds = list(dict.fromkeys(line.partition(separator)[0].strip() for line in begin))
+    if len(kinds) < 2 or any(map(math.isfinite, map(number_of, kinds))):
+        return ADVICE
+    return f"; its lines begin with the kind of their numbers ({', '.join(kinds)[:100]}): write those of one kind into a file, below their names"
 
 
 def _titled(theirs: list[str], row: list[str], separator: str) -> list[str]:
@@ -339,6 +348,12 @@ def _common(names: Sequence[str]) -> set[str]:
 def _unit(text: str) -> str | None:
     """The unit of this spelling, None for one that is not known."""
     return BY_SPELLING.get(re.sub(r"[ ()]", "", text.casefold()))
+
+
+def time_unit(title: str) -> str:
+    """The unit of time in brackets that ends a title; empty for another one, and for none."""
+    unit = _parted(title)[1] or "" if BRACKETS.search(title) else ""
+    return unit if UNITS.get(unit, ("",))[0] == "time" else ""
 
 
 def _words(text: str) -> list[str]:
