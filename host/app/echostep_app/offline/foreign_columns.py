@@ -52,9 +52,9 @@ COUNTERS = re.compile(r"packetcounter|count|counter|sample(?:count|number|index)
 # Microseconds in exports of Movella DOT, tenths of a millisecond in those of MT Manager
 CLOCK, DOT_CLOCK_HZ, MT_CLOCK_HZ, CLOCK_PERIOD = "SampleTimeFine", 1e6, 1e4, 1 << 32
 DOT = "DeviceTag:"  # begins a line above the names of the columns
-DOT_PREAMBLE = r"\"?sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
 SENSORS = ",left_sensor,"  # begins a line above the names of the columns of gaitmap
-PREAMBLE = re.compile(rf"{SENSORS}|//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
+# Lines above the names of the columns: of gaitmap, MT Manager, Excel and Movella DOT, and all of one cell
+PREAMBLE = re.compile(rf"{SENSORS}|//|\"?sep=|\w[\w ]*: *,|[^,;\t]*\n")
 COUNTS_HZ = re.compile(r"(?:Update Rate: *|Acquisition frequency: *|data_rate = )([0-9.]+) *Hz")
 ADVICE = "; other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"  # for a file without the names
 MOST_PREAMBLE, BEGIN = 50, 50  # lines above the names, and of numbers that are read to know the units; assumed
@@ -300,6 +300,9 @@ def proposal(titles: Sequence[str], titled: Sequence[str], first: Callable[[str]
     common = _common([name for name, _ in parted])
     ros = any("angularvelocity" in _letters(title) for title in titles)
     stamp = next((title for title in titles if _letters(title).endswith("headerstamp")), "")
+    free = next((title for title in titles if FREE.match(_letters(title))), "")
+    if free and not any(_ours(name, ros, common) == "ax" for name, _ in parted):
+        return f"; {free} is without gravity, which a track needs: record the accelerometer itself"
     found: dict[str, tuple[str, str]] = {}
     for title, (name, unit) in zip(titles, parted, strict=True):
         ours = _ours(name, ros, common)
@@ -308,9 +311,6 @@ def proposal(titles: Sequence[str], titled: Sequence[str], first: Callable[[str]
         if ours in found or "," in title or unit is None:
             return ""
         found[ours] = title, unit
-    free = next((title for title in titles if FREE.match(_letters(title))), "")
-    if free and "ax" not in found:
-        return f"; {free} is without gravity, which a track needs: record the accelerometer itself"
     if not set(COLUMNS[1:]) <= found.keys():
         return ""
     advice = ""
