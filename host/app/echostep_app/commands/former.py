@@ -6,7 +6,6 @@ In: the words of a command line. Out: a sentence; empty for a command line of to
 
 from __future__ import annotations
 
-import stat
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -23,14 +22,10 @@ def former_use(words: Sequence[str]) -> str:
 
 def piped(words: Sequence[str]) -> str:
     """The sentence about the first pipe in place of a file, which commands read several times; empty where there is none."""
-    pipe = next((word for word in words if word == "-" or _is_pipe(word)), "")
-    return f"{pipe}: a pipe cannot be read twice: write it to a file, and give that" if pipe else ""
-
-
-def _is_pipe(word: str) -> bool:
-    with suppress(OSError, ValueError):
-        return stat.S_ISFIFO(Path(word).stat().st_mode)
-    return False
+    with suppress(OSError):  # a word that can be no name of a file
+        if pipe := next((word for word in words if word == "-" or Path(word).is_fifo()), ""):
+            return f"{pipe}: a pipe cannot be read twice: write it to a file, and give that"
+    return ""
 
 
 def _is_used(use: str, line: str) -> bool:

@@ -138,7 +138,10 @@ class Roster:
             elif leaf == "presence":
                 self._receive_presence(team, name, decode_presence(payload))
             elif leaf == BEACONS:
-                _check_beacons(name, payload)
+                if (beacons := parse_team_beacons(payload)) is None or beacons.name != name:
+                    raise BadReportError(
+                        "not valid beacons" if beacons is None else "beacons and topic contradict each other"
+                    )
             else:
                 raise BadReportError("unknown topic")
         except BadReportError as error:
@@ -249,11 +252,3 @@ def _topic_parts(topic: str | None) -> tuple[str, str, str]:
     for name in parts[1:3]:
         check_name(name)
     return parts[1], parts[2], parts[3]
-
-
-def _check_beacons(name: str, payload: bytes) -> None:
-    """Raises BadReportError for a payload that is not the beacons of this wearer."""
-    if (beacons := parse_team_beacons(payload)) is None:
-        raise BadReportError("not valid beacons")
-    if beacons.name != name:
-        raise BadReportError("beacons and topic contradict each other")

@@ -206,18 +206,15 @@ class Heading:
             return
         waves = harmonics(heading)
         innovation = wrap(compass - heading - float(self.state[IRON:] @ waves))
-        if not self._steady(t_s, compass) or abs(innovation) > self._gate():
+        iron = float(np.trace(self.P[IRON:, IRON:]))
+        gate = GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
+        if not self._steady(t_s, compass) or abs(innovation) > gate:
             self.refused += 1
             return
         row = np.zeros(SIZE)
         row[HEADING], row[IRON:] = 1.0, waves
         alike = max(1.0, self.settings.same_s / self._period_s)  # readings with the same disturbance
         self._update(row, innovation, alike * self.settings.disturbance_rad**2)
-
-    def _gate(self) -> float:
-        """Largest innovation (rad) of the compass."""
-        iron = float(np.trace(self.P[IRON:, IRON:]))
-        return GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
 
     def _steady(self, t_s: float, compass: float) -> bool:
         """Whether compass and gyro turned alike within about the last second."""

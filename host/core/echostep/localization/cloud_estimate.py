@@ -83,7 +83,8 @@ def estimate_of(
     (m), if not the cloud's.
     """
     (cloud, right), *rivals = mixture
-    weight, shares = cloud.weight, _shares(mixture)
+    weight, shares = cloud.weight, np.array([probability for _, probability in mixture])
+    shares = shares / shares.sum() if shares.any() else np.full(len(mixture), 1.0 / len(mixture))
     levels = tuple((shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
     z = float(weight @ cloud.z_m)
     height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
@@ -117,12 +118,6 @@ def estimate_of(
         t_s, x, y, xx, xy, yy, math.atan2(north, east), spread, step, status, levels.index(max(levels)), levels, *height,
         protection_m, right, places, plan_fits, outside,
     )  # fmt: skip
-
-
-def _shares(mixture: Mixture) -> Floats:
-    """Probability (n,) of each cloud, if the trunk is in one of them."""
-    probability = np.array([probability for _, probability in mixture])
-    return probability / probability.sum() if probability.any() else np.full(len(mixture), 1.0 / len(mixture))
 
 
 def _places(mixture: Mixture, walk_heading_rad: float) -> tuple[LikelyPlace, ...]:

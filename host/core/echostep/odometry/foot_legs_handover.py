@@ -95,7 +95,9 @@ class FootLegsHandover:
         if self._leg_path is not None:
             return self._append_leg_segments(self._leg_path.feed(block)) + self._return_to_foot()
         if was_worn and not self.is_foot_worn:
-            self._go_back()
+            while self._kept_segments and self._kept_segments[-1].dx_m == self._kept_segments[-1].dy_m == 0.0:
+                self._kept_segments.pop()  # back to where the foot's last stand began
+            self._covered_s = self._kept_segments[-1].t1_s if self._kept_segments else self._covered_s
         elif not is_silent and self.is_foot_worn:
             return []
         return self._switch_to_legs()
@@ -106,12 +108,6 @@ class FootLegsHandover:
         gain = math.log(STANDS_RAD_S / SWINGS_RAD_S) + rate * (1.0 / STANDS_RAD_S - 1.0 / SWINGS_RAD_S)
         gain = gain / ALIKE if rate < math.inf else 0.0  # not a number: no leg gyro
         self._log_odds = max(self._log_odds + gain, NOT_WORN) if foot_stands else NOT_WORN
-
-    def _go_back(self) -> None:
-        """Take the foot's path back to where its last stand began."""
-        while self._kept_segments and self._kept_segments[-1].dx_m == self._kept_segments[-1].dy_m == 0.0:
-            self._kept_segments.pop()
-        self._covered_s = self._kept_segments[-1].t1_s if self._kept_segments else self._covered_s
 
     def _switch_to_legs(self) -> list[PathSegment]:
         """Process the kept leg samples; the legs become active if leg gyros are worn."""

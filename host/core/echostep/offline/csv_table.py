@@ -127,7 +127,9 @@ def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequ
         raise ValueError("no samples")
     if limits.early_rows is not None and bad > MOST_BAD * len(numbers):
         share = f"{100 * bad / len(numbers):.0f} % of the first {len(numbers)} rows"
-        raise ValueError(f"{share} have no number in some column, or more cells than there are names: each row needs all")
+        raise ValueError(
+            f"{share} have no number in some column, or more cells than there are names: each row needs all"
+        )
     return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
 
 

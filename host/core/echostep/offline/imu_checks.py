@@ -172,7 +172,9 @@ def _dead_complaint(table: Floats, columns: Sequence[str]) -> str:
 
 def _unit_complaint(table: Floats) -> str:
     """Message for forces in g or without gravity, and for rates in deg/s."""
-    force = _resting_force(table)
+    rate = np.linalg.norm(table[:, RATE], axis=1)
+    calm = rate <= np.quantile(rate, CALMEST_SHARE)  # over all samples of a run the median is far above gravity
+    force = float(np.median(np.linalg.norm(table[calm, FORCE], axis=1)))
     if G_RANGE[0] <= force <= G_RANGE[1]:
         return f"ax, ay, az look like g (at rest they are {force:.2f}): multiply them by 9.80665, or say --units g"
     if not GRAVITY_RANGE_M_S2[0] <= force <= GRAVITY_RANGE_M_S2[1]:
@@ -181,13 +183,6 @@ def _unit_complaint(table: Floats) -> str:
     if fastest > FASTEST_FOOT_RAD_S:
         return f"gx, gy, gz reach {fastest:.0f}, no foot turns so fast in rad/s: in deg/s? multiply them by pi/180, or say --units deg/s"
     return ""
-
-
-def _resting_force(table: Floats) -> float:
-    """Median specific force (m/s2) while the foot turns least; over all samples of a run the median is far above gravity."""
-    rate = np.linalg.norm(table[:, RATE], axis=1)
-    calm = rate <= np.quantile(rate, CALMEST_SHARE)
-    return float(np.median(np.linalg.norm(table[calm, FORCE], axis=1)))
 
 
 def notes(table: Floats, columns: Sequence[str]) -> tuple[str, ...]:

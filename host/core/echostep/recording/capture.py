@@ -62,7 +62,8 @@ def read_capture(path: Path | str, decoder: Decoder | None = None) -> Iterator[M
             recorded = file.read(len(MCAP_MAGIC)) == MCAP_MAGIC
     except OSError as error:
         raise EchostepError(f"{path}: cannot read the capture: {error.strerror}") from error
-    port = "" if recorded else _port_that_sends(path)
+    if (port := "" if recorded else port_of_bytes(path, 0.0)) is None:  # the caller knows the kind of the file
+        raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
     decoder.mt.formats.learn(FrameReader(LONGEST).feed(_head(_chunks(path, port)), ended=True))
     for name, received in _chunks(path, port):
         yield from decoder.feed(name, received)
@@ -105,13 +106,6 @@ def port_of_bytes(path: Path, least_share: float = LEAST_SHARE) -> str | None:
     understood[MTX] += _bytes_of_frames(mt, b"", ended=True)
     port = max(understood, key=lambda port: understood[port])
     return port if understood[port] > least_share * seen else None
-
-
-def _port_that_sends(path: Path) -> str:
-    """The port of which any frame is found: the caller knows the kind of the file. Raises EchostepError where there is none."""
-    if (port := port_of_bytes(path, 0.0)) is None:
-        raise EchostepError(f"{path}: neither board frames nor Xbus frames nor an MCAP recording")
-    return port
 
 
 def _bytes_of_frames(reader: FrameReader, received: bytes, *, ended: bool = False) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from ezdxf.enums import TextEntityAlignment
 from ezdxf.math import Matrix44, Vec3
-from ezdxf.render import MeshBuilder
+from ezdxf.render.mesh import MeshBuilder
 
 from echostep.errors import EchostepError
 from echostep.plan import Plan
@@ -44,7 +44,7 @@ def body_of(x: float) -> Any:
     """A wall as faces in space."""
     mesh = MeshBuilder()
     mesh.add_mesh(
-        vertices=map(Vec3, [(x, 20, 0), (x + 0.2, 20, 0), (x + 0.2, 24, 3), (x, 24, 3)]), faces=[(0, 1, 2, 3)]
+        vertices=Vec3.list([(x, 20, 0), (x + 0.2, 20, 0), (x + 0.2, 24, 3), (x, 24, 3)]), faces=[(0, 1, 2, 3)]
     )
     return mesh
 

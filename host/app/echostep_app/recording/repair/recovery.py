@@ -24,19 +24,10 @@ from mcap.records import Channel, Header, Metadata, Schema
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.recording import MCAP_MAGIC, is_being_written
+from echostep.recording.damage import scan
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import (
-    CHUNK,
-    CHUNK_HEAD,
-    PRIVATE,
-    begin_in_chunk,
-    chunk_matches,
-    map_file,
-    next_valid_run,
-    record_end,
-)
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     DAMAGE_NAME,
@@ -52,6 +43,7 @@ from echostep.recording.mcap_records import (
 )
 
 PLACED_AT_ONCE = 8192  # messages whose places are decided together: some seconds of a walk; assumed
+PLACE = scan.PRIVATE, bytes(scan.CHUNK_HEAD - HEAD_SIZE)  # that the head of an open chunk will have
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -93,7 +85,7 @@ class Recovery:
 
     def messages(self) -> Iterator[RecordedMessage]:
         """All readable messages in their place; raises EchostepError when the file cannot be read or is not an MCAP file."""
-        file = map_file(self.path)
+        file = scan.map_file(self.path)
         self.size, self.grows = len(file), is_being_written(self.path)
         if not begins_as_mcap(file):
             raise EchostepError(
@@ -135,13 +127,13 @@ class Recovery:
         view = file.data
         size = len(file)
         while begin < size:
-            end = record_end(file, begin, self._is_channel)
-            if (inside := begin_in_chunk(file, begin)) >= 0:
-                self.own_damage.altered |= not self.intact and end >= 0 and not chunk_matches(file, inside, end)
+            end = scan.record_end(file, begin, self._is_channel)
+            if (inside := scan.begin_in_chunk(file, begin)) >= 0:
+                self.own_damage.altered |= not self.intact and end >= 0 and not scan.chunk_matches(file, inside, end)
                 begin = inside
                 continue
             if end < 0:
-                end = next_valid_run(file, begin + 1, self._is_channel)
+                end = scan.next_valid_run(file, begin + 1, self._is_channel)
                 if self.grows and end == size:
                     return
                 yield begin, end, None
@@ -150,7 +142,7 @@ class Recovery:
             opcode, body = view[begin], begin + HEAD_SIZE
             if opcode == MESSAGE:
                 yield begin, end, self._message(view[body:end])
-            elif opcode == CHUNK:
+            elif opcode == scan.CHUNK:
                 yield begin, end, bytes(view[body:end])
             elif opcode == Opcode.FOOTER and end + len(MCAP_MAGIC) >= size:
                 self.has_footer = True
@@ -199,10 +191,7 @@ class Recovery:
                 self.metadata = dict(stored.metadata)
             elif stored.name == DAMAGE_NAME:
                 self.before = list(stored.metadata.values())
-        elif opcode >= PRIVATE and (opcode, body) != (
-            PRIVATE,
-            bytes(CHUNK_HEAD - HEAD_SIZE),
-        ):  # the place of an open chunk
+        elif opcode >= scan.PRIVATE and (opcode, body) != PLACE:
             self.keep_private(opcode, body)
 
 

@@ -67,13 +67,16 @@ class TeamBeaconMap:
         for reading in readings if self.reported else ():
             number = numbers[reading.slot]
             reports = {name: beacons[number] for name, beacons in self.reported.items() if number in beacons}
-            meetings += [(reading.t_s, _range_to(name, b, reading, 1.0 / len(reports))) for name, b in reports.items()]
+            for name, b in reports.items():
+                place = b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2
+                at = Meeting(
+                    name,
+                    "uncertain",
+                    *place,
+                    range_m=reading.range_m,
+                    range_sd_m=TEAM_RANGE_SD_M,
+                    beacon=b.number,
+                    share=1.0 / len(reports),
+                )
+                meetings.append((reading.t_s, at))
         return meetings
-
-
-def _range_to(name: str, b: SharedBeacon, reading: BeaconReading, share: float) -> Meeting:
-    """A reading as a range to the place that the teammate `name` reports for the beacon."""
-    return Meeting(
-        name, "uncertain", b.x_m, b.y_m, b.level, b.xx_m2, b.xy_m2, b.yy_m2,
-        range_m=reading.range_m, range_sd_m=TEAM_RANGE_SD_M, beacon=b.number, share=share,
-    )  # fmt: skip

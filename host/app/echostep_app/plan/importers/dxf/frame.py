@@ -103,7 +103,7 @@ def _broken() -> tuple[type[Exception], ...]:
 def paths(entity: Any) -> Iterator[Any]:
     """The outlines of an entity: one for lines and curves, several for hatches, multilines and faces; none for texts and pictures."""
     from ezdxf import path
-    from ezdxf.render import MeshBuilder
+    from ezdxf.render.mesh import MeshBuilder
 
     kind = entity.dxftype()
     if kind in PICTURES:
