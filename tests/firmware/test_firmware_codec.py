@@ -104,6 +104,9 @@ def test_every_vector(tmp_path: Path) -> None:
     cases = [
         case(number, json.loads(line)) for number, line in enumerate(lines, 1) if '"message": "beacon"' not in line
     ]
+    full = "01" * 254  # a last block of 254 bytes, with and without the empty block that none need send
+    cases.append(f"same(0, out, cobs_decode(out, {array('ff' + full + '01')}, 256), {array(full)}, 254);")
+    assert {"cobs": "ones", "plain": full, "encoded": "ff" + full} in map(json.loads, lines)
     source = tmp_path / "vectors.c"
     source.write_text(f"{PROLOGUE}int main(void)\n{{\n\tlong n;{''.join(cases)}\n\treturn failures != 0;\n}}\n")
     done = run(build(tmp_path / "vectors", "cc", [source, *CODEC], "-O0", "-fsanitize=address,undefined"))

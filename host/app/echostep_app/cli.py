@@ -12,7 +12,9 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -107,7 +109,7 @@ def tell_of_compiling() -> None:
 def _status() -> int:
     """The exit status of the command, which is run."""
     try:
-        if words := former_use(sys.argv[1:]):
+        if words := former_use(sys.argv[1:]) or piped(sys.argv[1:]):
             raise EchostepError(words)
         app()
     except SystemExit as end:
@@ -136,6 +138,14 @@ def former_use(words: Sequence[str]) -> str:
     given = (word.replace("=", " ", 1) if word.startswith("--") else word for word in words if word != "--share")
     line = f" {' '.join(given)} "
     return next((has_left(use) for use in INSTEAD if _is_used(use, line)), "")
+
+
+def piped(words: Sequence[str]) -> str:
+    """The sentence about the first pipe in place of a file, which commands read several times; empty where there is none."""
+    with suppress(OSError):  # a word that can be no name of a file
+        if pipe := next((word for word in words if word == "-" or Path(word).is_fifo()), ""):
+            return f"{pipe}: a pipe cannot be read twice: write it to a file, and give that"
+    return ""
 
 
 def _is_used(use: str, line: str) -> bool:

@@ -6,6 +6,8 @@ In: nothing. Out: `EchostepError`, `IncompleteError`; any error in words; a sent
 
 from __future__ import annotations
 
+from errno import EMFILE, ENFILE
+
 PACKED = {  # by the first bytes [file(1)]
     b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"PK\x03\x04": "zip", b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7z",
 }  # fmt: skip
@@ -21,6 +23,8 @@ class IncompleteError(EchostepError):
 
 def words_of(error: BaseException) -> str:
     """The error as a command that it ends prints it, and as the page of a run shows it."""
+    if isinstance(error, OSError) and error.errno in (EMFILE, ENFILE):
+        return f"{error.strerror}: end what has them open, or allow more (ulimit -n 1024)"
     if isinstance(error, OSError):
         return f"{error.filename or 'a file'}: {error.strerror or error}"
     return str(error) if isinstance(error, EchostepError) else f"{type(error).__name__}: {error}"

@@ -171,7 +171,9 @@ class CheckedFiles(_Files):  # type: ignore[misc]
         if data and content.startswith(begin) and zlib.crc32(data).to_bytes(DIGEST, "big") == content[-DIGEST:]:
             return data
         if not (begin and _is_of_another_numba(content)):
-            _put_aside(path)
+            tell(DAMAGED)
+            with suppress(OSError):  # then its kernel is compiled again at each start
+                os.replace(path, path + ASIDE)  # noqa: PTH105
         return None
 
 
@@ -182,13 +184,6 @@ def _is_of_another_numba(index: bytes) -> bool:
     except Exception:  # damaged bytes make pickle raise any exception
         return False
     return isinstance(version, str) and version.isprintable() and version != numba.__version__
-
-
-def _put_aside(path: str) -> None:
-    """Rename a damaged file; where that fails, its kernel is compiled again at each start."""
-    tell(DAMAGED)
-    with suppress(OSError):
-        os.replace(path, path + ASIDE)  # noqa: PTH105
 
 
 def check_files(dispatcher: Any) -> None:

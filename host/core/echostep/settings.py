@@ -114,19 +114,17 @@ def parse_settings(text: str, origin: str, *, recorded: bool = False) -> Setting
     `recorded`: the text is a recording's, which may carry settings that have left.
     """
     try:
-        return _settings_of(tomllib.loads(text), recorded=recorded)
+        tree = tomllib.loads(text)
+        defaults = {f.name: getattr(Settings(), f.name) for f in dataclasses.fields(Settings)}
+        if unknown := tree.keys() - defaults.keys():
+            raise ValueError(f"[{min(unknown)}] is no section; there are {', '.join(defaults)}")
+        return Settings(
+            **{name: _section(name, rows, defaults[name], recorded=recorded) for name, rows in tree.items()}
+        )
     except ValueError as error:
         raise EchostepError(f"{origin}: {error}") from error
     except RecursionError as error:
         raise EchostepError(f"{origin}: its values are nested too deeply: settings are sections of numbers") from error
-
-
-def _settings_of(tree: dict[str, Any], *, recorded: bool) -> Settings:
-    """Settings from a parsed TOML tree; raises ValueError that names the section and the field."""
-    defaults = {f.name: getattr(Settings(), f.name) for f in dataclasses.fields(Settings)}
-    if unknown := tree.keys() - defaults.keys():
-        raise ValueError(f"[{min(unknown)}] is no section; there are {', '.join(defaults)}")
-    return Settings(**{name: _section(name, rows, defaults[name], recorded=recorded) for name, rows in tree.items()})
 
 
 def _section(name: str, rows: Any, default: Any, *, recorded: bool) -> Any:

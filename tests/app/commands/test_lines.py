@@ -224,13 +224,45 @@ def test_the_sketch_of_the_manual_prints_what_is_read() -> None:
     assert np.allclose(samples, [[1.5, 1, 2, 9.8, 0.1, 0.2, 0.3]])
 
 
-def test_a_clock_that_is_set_goes_on_by_the_arrivals() -> None:
-    """A device that restarts after a second, with the host's clock 0.5 s on; one sample comes late and is left out."""
-    row = [0.0, 0.0, 0.0, 9.81, 0.1, 0.0, 0.0]
+ROW = [0.0, 0.0, 9.81, 0.1, 0.0, 0.0]
+
+
+def made_of(times: list[tuple[float, int]]) -> tuple[LineChunks, list[int], list[int]]:
+    """What becomes of samples at times of the device (s) that arrive at others (ns): times of the chunks, counters of the samples."""
     chunks, reader = LineChunks(100.0), MtxReader()
-    times = [(10.0, 0), (10.99, 990_000_000), (10.5, 995_000_000), (0.0, 1_490_000_000), (0.01, 1_500_000_000)]
-    made = [chunk for t_s, ns in times for chunk in chunks.of(np.array([[t_s, *row[1:]]]), ns)]
-    assert [chunk.t_arrival_ns for chunk in made] == [0, 990_000_000, 1_490_000_000, 1_500_000_000]
+    made = [chunk for t_s, ns in times for chunk in chunks.of(np.array([[t_s, *ROW]]), ns)]
     assert {chunk.port for chunk in made} == {MTX}
-    assert reader.feed_batch(b"".join(chunk.data for chunk in made)).counter.tolist() == [0, 99, 149, 150]
-    assert (chunks.jumps, chunks.left_out) == (1, 1)
+    counters = reader.feed_batch(b"".join(chunk.data for chunk in made)).counter.tolist()
+    return chunks, [chunk.t_arrival_ns for chunk in made], counters
+
+
+def test_a_clock_that_is_set_goes_on_by_the_arrivals() -> None:
+    """A device that restarts after a second, with the host's clock 0.5 s on; one sample comes twice and is left out."""
+    after = [(0.0, 1_490_000_000), (0.01, 1_500_000_000)]
+    chunks, arrivals, counters = made_of([(10.0, 0), (10.99, 990_000_000), (10.99, 995_000_000), *after])
+    assert arrivals == [0, 995_000_000, 1_500_000_000, 1_500_000_000]
+    assert counters == [0, 99, 149, 150]
+    assert (chunks.jumps, chunks.left_out, chunks.off) == (1, 1, 0)
+
+
+@pytest.mark.parametrize("wrong_s", [1.0, -1.0, 5.0])
+def test_a_single_time_out_of_line_costs_its_own_sample(wrong_s: float) -> None:
+    times = [(0.01 * k + wrong_s * (k == 5), 10_000_000 * k) for k in range(9)]
+    chunks, _, counters = made_of(times)
+    assert counters == [0, 1, 2, 3, 4, 6, 7, 8]
+    assert (chunks.jumps, chunks.left_out, chunks.off) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("period_s", [2**32 * 1e-6, 2**16 * 1e-3])
+def test_a_counter_that_wraps_goes_on(period_s: float) -> None:
+    chunks, _, counters = made_of([((0.01 * k - 0.02) % period_s, 10_000_000 * k) for k in range(5)])
+    assert (counters, chunks.jumps, chunks.off) == ([0, 1, 2, 3, 4], 0, 0)
+
+
+def test_a_clock_of_ticks_and_a_line_of_zeros_are_read_as_in_files() -> None:
+    reader = LineReader()
+    sent = (
+        b"SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n20000,1,2,3,4,5,6\n30000,0,0,0,0,0,0\n40000,1,2,3,4,5,6\n"
+    )
+    assert reader.feed(sent)[:, 0] == pytest.approx([0.02, 0.04])
+    assert reader.unreadable == 1

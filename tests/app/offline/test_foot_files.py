@@ -73,6 +73,18 @@ def phyphox(folder: Path, walk: np.ndarray) -> Path:
     return folder
 
 
+def meta_base(folder: Path, walk: np.ndarray) -> Path:
+    """A file of each sensor, with the seconds since its own start beside the time of day."""
+    for name, unit, values in (
+        ("Accelerometer", "g", walk[:, 1:4] / G),
+        ("Gyroscope", "deg/s", np.degrees(walk[:, 4:7])),
+    ):
+        names = "epoch (ms),timestamp (-0700),elapsed (s)," + ",".join(f"{axis}-axis ({unit})" for axis in "xyz")
+        elapsed_s = walk[:, 0] * 1.01
+        table(folder / f"Left_E3_{name}_100.000Hz_1.4.2.csv", names, 1e3 * walk[:, 0], elapsed_s, elapsed_s, values)
+    return folder
+
+
 def titles(accel: str, gyro: str, letters: str = "XYZ") -> str:
     return ",".join(title.format(letter) for title in (gyro, accel) for letter in letters)
 
@@ -107,7 +119,7 @@ def gaitmap(folder: Path, walk: np.ndarray) -> Path:
     return table(folder / "walk.csv", f"{above},{names},{names}", walk[:, 0], *left, walk[:, 1:7] * 0.5)
 
 
-PHONES = (sensor_logger, sensor_logger_of_ios, sensor_logger_of_an_iphone, sensor_log, phyphox)
+PHONES = (sensor_logger, sensor_logger_of_ios, sensor_logger_of_an_iphone, sensor_log, phyphox, meta_base)
 FORMATS = (*PHONES, x_imu3, ngimu, pyshoe, sensor_connect, gaitmap)
 
 
@@ -158,6 +170,11 @@ def refused(folder: Path, name: str, content: bytes) -> str:
 
 def test_what_a_file_lacks_is_one_sentence(tmp_path: Path) -> None:
     assert "a.xls: binary, not a table: export it as CSV" in refused(tmp_path, "a.xls", b"\xd0\xcf" + bytes(99))
+    assert "a.json: JSON, not a table: export it as CSV" in refused(
+        tmp_path, "a.json", b'[{"sensor":"Gyroscope","x":"0"}]'
+    )
+    lines = b"$COL,IMU,time,wx,ax\n$UNIT,IMU,s,deg/s,g\n$BARO,1,2\n$IMU,1,2,3\n"
+    assert "lines begin with the kind of their numbers ($BARO, $IMU)" in refused(tmp_path, "a.csv", lines)
     assert "no XML" in refused(tmp_path, "a.mvnx", b"<mvnx><frame")
     assert "no MAT file that can be read" in refused(tmp_path, "a.mat", b"MATLAB 5.0 MAT-file" + bytes(200))
     savemat(tmp_path / "huge.mat", {"ts": np.arange(300) / 100.0, "imu": np.full((300, 6), 1e300)})

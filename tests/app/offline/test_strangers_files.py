@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from command_line import echostep
+from echostep.errors import words_of
 from echostep.offline.imu_csv import COLUMNS
 from foot.foot_walks import walking
 from needs_data import data_or_skip
@@ -45,6 +47,12 @@ def filled(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def stamped(rows: np.ndarray) -> np.ndarray:
+    """Ten single stamps that are late, or early, by a second, and not by whole periods."""
+    rows[300:1300:100, 0] += np.where(np.arange(10) % 2, 1.004, -1.004)
+    return rows
+
+
 def dot(rows: np.ndarray) -> np.ndarray:
     """Movella DOT's, without the lines above the names; its microseconds wrap."""
     clock = (np.round(1e6 * rows[:, 0]) + (1 << 32) - 5e6) % (1 << 32)
@@ -59,6 +67,7 @@ OURS, DOT = (
 
 @pytest.mark.parametrize(("spoil", "names", "form", "says"), [
     (filled, OURS, "%.9g", r"2\d rows without a number in some column: skipped"),
+    (stamped, OURS, "%.9g", r"10 times are out of line with their neighbours': skipped"),
     (lambda rows: np.column_stack([1e-6 * dot(rows)[:, 0], rows[:, 1:]]), OURS, "%.9f", "12 steps"),
     (dot, DOT, "%.12g", "read as an export of Movella DOT"),
     (lambda rows: rows, OURS, '"%.6f"', "12 steps"),
@@ -86,10 +95,17 @@ def test_held_rows_are_missing_and_a_clock_tells_the_time(
     assert says in (said := echostep("foot", "imu.txt", cwd=tmp_path, ends=0)).stderr + said.stdout
 
 
-@pytest.mark.parametrize("command", ["foot", "legs"])
-def test_a_pipe_is_named_before_it_is_waited_for(command: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["foot", "legs", "plan import", "plan check", "replay", "info"])
+@pytest.mark.parametrize("name", ["pipe", "-"])
+def test_a_pipe_is_named_before_it_is_waited_for(command: str, name: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    assert "pipe: no file, but a folder, pipe or device" in echostep(command, "pipe", cwd=tmp_path, ends=2).stderr
+    said = echostep(*command.split(), name, cwd=tmp_path, ends=2).stderr
+    assert said == f"echostep: {name}: a pipe cannot be read twice: write it to a file, and give that\n"
+
+
+def test_where_no_file_can_be_opened_no_package_is_named() -> None:
+    error = OSError(errno.EMFILE, os.strerror(errno.EMFILE), "site-packages/numba/context.py")
+    assert words_of(error) == "Too many open files: end what has them open, or allow more (ulimit -n 1024)"
 
 
 @pytest.mark.process

@@ -136,6 +136,25 @@ def test_mending_a_whole_file_changes_nothing_in_it(tmp_path: Path) -> None:
     assert "nothing was wrong" in "\n".join(repair(tmp_path / "a.mcap", tmp_path / "b.mcap"))
 
 
+def test_records_of_other_programs_are_read_over_and_kept(tmp_path: Path) -> None:
+    """In a file that was not closed, too; a message with a wrong bit in its opcode is none of them."""
+    write(tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    begin = summary.chunk_indexes[0].chunk_start_offset
+    notes = struct.pack("<BQ", 0x85, 26) + b"a record that others wrote", struct.pack("<BQ", 0xFF, 0)
+    content = recorded()[:begin] + b"".join(notes) + recorded()[begin:]
+    assert saved(content[: -(len(recorded()) - summary.chunk_indexes[0].chunk_length - begin)], tmp_path) == CHUNKS
+    (tmp_path / "a.mcap").write_bytes(content)
+    assert not open_recording(tmp_path / "a.mcap").damage()
+    assert all(note in (tmp_path / "out.mcap").read_bytes() for note in notes)
+    assert info(tmp_path / "out.mcap")[-1] == "  whole, but made of a damaged recording"
+    message = content.index(CHUNKS[199].data) - 22 - 9
+    assert saved(content[:message] + b"\x85" + content[message + 1 :], tmp_path) == CHUNKS[:199] + CHUNKS[200:]
+    assert "damaged bytes in one place were not used" in "\n".join(info(tmp_path / "bad.mcap"))
+
+
 @given(st.data())
 @FIXTURE
 def test_a_file_cut_off_anywhere_keeps_all_before(tmp_path: Path, draw: st.DataObject) -> None:

@@ -56,7 +56,9 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
     parameters: list[Parameter] = []
     for name, parameter in signature(command).parameters.items():
         if name in groups:
-            parameters += _options_of(groups[name])
+            kinds = get_type_hints(groups[name], include_extras=True)
+            for f in fields(groups[name]):
+                parameters.append(parameter.replace(name=f.name, default=f.default, annotation=kinds[f.name]))
         else:
             parameters.append(parameter.replace(annotation=hints[name]))
 
@@ -69,14 +71,6 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     return run
-
-
-def _options_of(group: Any) -> list[Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        Parameter(f.name, Parameter.POSITIONAL_OR_KEYWORD, default=f.default, annotation=hints[f.name])
-        for f in fields(group)
-    ]
 
 
 @dataclass(frozen=True, slots=True)

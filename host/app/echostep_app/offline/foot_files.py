@@ -30,11 +30,12 @@ from echostep.offline.csv_table import GREATEST, header_of, lines_of, open_sampl
 from echostep.offline.imu_checks import NEEDED
 from echostep.offline.imu_csv import LIMITS, Imu, imu_of, load_imu
 from echostep_app.extras import require
-from echostep_app.offline.foreign_columns import OWN, Naming, read_header
+from echostep_app.offline.foreign_columns import OWN, Naming, read_header, time_unit
 from echostep_app.offline.ros_bag import IMU, is_bag, read_bag
 from echostep_app.printing.lines import as_error, faults_of
 
 SESSIONS = ("inertial", "sensors", "raw data")  # files of one session that have both sensors: x-IMU3, NGIMU, phyphox
+TIMES = "t_s", "seconds_elapsed"  # in a table of one sensor; or any title with a unit of time
 MAT_IMU, MAT_TIME = ("imu_data", "imu"), ("timestamps_all", "timestamps", "ts", "t_s")
 GRAVITY_M_S2 = np.array([0.0, 0.0, 9.80665])  # specific force at rest, z up
 MOST_BYTES = 1 << 30  # of the tables of a zip, and of a MAT or MVNX file; assumed
@@ -123,12 +124,13 @@ def _vectors(file: TextIO, ours: str) -> Floats:
     lines = lines_of(file, LIMITS)
     first = next(lines, "")
     theirs, _ = header_of(first)
-    time = next((name for name in ("t_s", "seconds_elapsed", "Time (s)", "Timestamp (us)") if name in theirs), "")
+    time = next((name for name in theirs if name in TIMES or time_unit(name)), "")
     axes = [
-        next((name for name in theirs if re.fullmatch(rf"(.* )?{axis}( \(.*\))?", name, re.I)), "") for axis in "xyz"
+        next((name for name in theirs if re.fullmatch(rf"(.* )?{axis}(-axis)?( \(.*\))?", name, re.I)), "")
+        for axis in "xyz"
     ]
     if not time or not all(axes):
-        raise ValueError("expected a column of times (seconds_elapsed, Time (s)) and the axes x, y, z")
+        raise ValueError("expected a column of times (seconds_elapsed, Time (s), epoch (ms)) and the axes x, y, z")
     columns = {"t_s": time} | {ours + axis: name for axis, name in zip("xyz", axes, strict=True)}
     head = read_header(iter([first]), Naming(columns))
     rows = head.table(lines, list(columns), 4, LIMITS).values

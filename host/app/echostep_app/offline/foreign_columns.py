@@ -18,6 +18,7 @@ PicoQuake: docs/acquisition_data.md of github.com/PLab-SI/PicoQuake.
 from __future__ import annotations
 
 import csv
+import math
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -51,9 +52,9 @@ COUNTERS = re.compile(r"packetcounter|count|counter|sample(?:count|number|index)
 # Microseconds in exports of Movella DOT, tenths of a millisecond in those of MT Manager
 CLOCK, DOT_CLOCK_HZ, MT_CLOCK_HZ, CLOCK_PERIOD = "SampleTimeFine", 1e6, 1e4, 1 << 32
 DOT = "DeviceTag:"  # begins a line above the names of the columns
-DOT_PREAMBLE = r"\"?sep=|\w[\w ]*: *,|.*Technologies B\. ?V\.|\s*\n"  # further ones, until an empty line
 SENSORS = ",left_sensor,"  # begins a line above the names of the columns of gaitmap
-PREAMBLE = re.compile(rf"{SENSORS}|//|Acquisition frequency:|{DOT_PREAMBLE}")  # lines above the names of the columns
+# Lines above the names of the columns: of gaitmap, MT Manager, Excel and Movella DOT, and all of one cell
+PREAMBLE = re.compile(rf"{SENSORS}|//|\"?sep=|\w[\w ]*: *,|[^,;\t]*\n")
 COUNTS_HZ = re.compile(r"(?:Update Rate: *|Acquisition frequency: *|data_rate = )([0-9.]+) *Hz")
 ADVICE = "; other names: --columns OURS=THEIRS,...; other units: --units deg/s,g"  # for a file without the names
 MOST_PREAMBLE, BEGIN = 50, 50  # lines above the names, and of numbers that are read to know the units; assumed
@@ -155,8 +156,16 @@ def read_header(lines: Iterator[str], naming: Naming = OWN) -> Header:
     names = ["t_s" if name == "time" and "t_s" not in names else name for name in names]
     names = _renamed(theirs, columns) if columns else names
     factors = factors_of(names, titled, units)
-    advice = ("" if naming.columns else proposal(theirs, titled, first, counted=counted)) or ADVICE
+    advice = ("" if naming.columns else proposal(theirs, titled, first, counted=counted)) or _kinds(begin, separator)
     return Header(names, separator, line, factors, counts_hz, period, notes, advice, tuple(begin))
+
+
+def _kinds(begin: list[str], separator: str) -> str:
+    """The advice for lines that begin with the kind of their numbers, else that for names that are not known."""
+    kinds = list(dict.fromkeys(line.partition(separator)[0].strip() for line in begin))
+    if len(kinds) < 2 or any(map(math.isfinite, map(number_of, kinds))):
+        return ADVICE
+    return f"; its lines begin with the kind of their numbers ({', '.join(kinds)[:100]}): write those of one kind into a file, below their names"
 
 
 def _titled(theirs: list[str], row: list[str], separator: str) -> list[str]:
@@ -291,6 +300,9 @@ def proposal(titles: Sequence[str], titled: Sequence[str], first: Callable[[str]
     common = _common([name for name, _ in parted])
     ros = any("angularvelocity" in _letters(title) for title in titles)
     stamp = next((title for title in titles if _letters(title).endswith("headerstamp")), "")
+    free = next((title for title in titles if FREE.match(_letters(title))), "")
+    if free and not any(_ours(name, ros, common) == "ax" for name, _ in parted):
+        return f"; {free} is without gravity, which a track needs: record the accelerometer itself"
     found: dict[str, tuple[str, str]] = {}
     for title, (name, unit) in zip(titles, parted, strict=True):
         ours = _ours(name, ros, common)
@@ -299,9 +311,6 @@ def proposal(titles: Sequence[str], titled: Sequence[str], first: Callable[[str]
         if ours in found or "," in title or unit is None:
             return ""
         found[ours] = title, unit
-    free = next((title for title in titles if FREE.match(_letters(title))), "")
-    if free and "ax" not in found:
-        return f"; {free} is without gravity, which a track needs: record the accelerometer itself"
     if not set(COLUMNS[1:]) <= found.keys():
         return ""
     advice = ""
@@ -339,6 +348,12 @@ def _common(names: Sequence[str]) -> set[str]:
 def _unit(text: str) -> str | None:
     """The unit of this spelling, None for one that is not known."""
     return BY_SPELLING.get(re.sub(r"[ ()]", "", text.casefold()))
+
+
+def time_unit(title: str) -> str:
+    """The unit of time in brackets that ends a title; empty for another one, and for none."""
+    unit = _parted(title)[1] or "" if BRACKETS.search(title) else ""
+    return unit if UNITS.get(unit, ("",))[0] == "time" else ""
 
 
 def _words(text: str) -> list[str]:

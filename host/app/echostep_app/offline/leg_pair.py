@@ -136,7 +136,10 @@ def _joint_strides(t_s: Floats, distance: Floats, seen: Bools, legs: Legs, diffe
     lengths = _between(times, t_s, distance)
     shown_s = np.array([_between(times, t_s, _summed(row * np.diff(t_s))) for row in seen])
     shows = shown_s > 0.5 * np.diff(times, axis=1).T
-    variances = np.array([_between(times, t_s, _variance_at(t_s, leg)) for leg in legs])
+    spreads = [
+        tuple(replace(s, length_m=s.length_sd_m**2) for s in leg) for leg in legs
+    ]  # m2, by the strides' own errors
+    variances = np.array([_between(times, t_s, distance_at(t_s, spread)) for spread in spreads])
     joint = []
     for k, stride in enumerate(strides):
         legs_showing = int(shows[:, k].sum())
@@ -169,8 +172,3 @@ def _between(times: Floats, t_s: Floats, grown: Floats) -> Floats:
 def _summed(pieces: Floats) -> Floats:
     """Sums (n,) of the pieces (n - 1,) up to each time."""
     return np.concatenate([[0.0], np.cumsum(pieces)])
-
-
-def _variance_at(t_s: Floats, strides: tuple[Stride, ...]) -> Floats:
-    """Variance (m2) of the distance up to each time (n,) by the strides' own errors."""
-    return distance_at(t_s, tuple(replace(s, length_m=s.length_sd_m**2) for s in strides))

@@ -52,7 +52,9 @@ def _level(level: Level, i: int, faces: Faces) -> Iterator[PlanFinding]:
     yield from _gaps(solid, tree, i)
     yield from _overlaps(solid, tree, i)
     yield from _doors(level, tree, i)
-    yield from _open_rooms(level, faces, i)
+    at = faces.indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
+    for room in (room for room, face in zip(level.rooms, at, strict=True) if face == OUTSIDE):
+        yield PlanFinding("open room", i, room.at_m, f"room {room.name!r} {NOT_ENCLOSED}")
 
 
 def _gaps(solid: Floats, tree: shapely.STRtree, i: int) -> Iterator[PlanFinding]:
@@ -114,14 +116,6 @@ def _distance(tree: shapely.STRtree, point: shapely.Point) -> float:
     """Distance to the nearest wall; infinity when it is more than 1 m."""
     distances = tree.query_nearest(point, max_distance=1.0, return_distance=True, all_matches=False)[1]
     return float(distances[0]) if len(distances) else float("inf")
-
-
-def _open_rooms(level: Level, faces: Faces, i: int) -> Iterator[PlanFinding]:
-    """Rooms whose position lies in no enclosed space."""
-    at = faces.indices_of(np.array([room.at_m for room in level.rooms]).reshape(-1, 2))
-    for room, face in zip(level.rooms, at, strict=True):
-        if face == OUTSIDE:
-            yield PlanFinding("open room", i, room.at_m, f"room {room.name!r} {NOT_ENCLOSED}")
 
 
 def _with_leak(finding: PlanFinding, level: Level) -> PlanFinding:

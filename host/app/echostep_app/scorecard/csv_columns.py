@@ -119,7 +119,9 @@ def read_csv(path: Path) -> CsvColumns:
         raise EchostepError(f"{path}:1: the names of the columns are expected in the first line")
     for line, row in read:
         if len(row) != len(names):
-            raise EchostepError(f"{path}:{line}: {len(row)} cells, but {len(names)} columns have a name in line 1")
+            raise EchostepError(
+                f"{path}:{line}: {len(row)} cells, but {len(names)} columns have a name in line 1: is that the line of names?"
+            )
     if not read:
         raise EchostepError(f"{path}: no line of numbers below the names of the columns")
     return CsvColumns(path, names, tuple(row for _, row in read), tuple(line for line, _ in read))

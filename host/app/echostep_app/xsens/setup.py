@@ -48,11 +48,6 @@ def product_text(code: bytes) -> str:
     return text if _TEXT.fullmatch(text) else ""
 
 
-def firmware_text(answer: bytes) -> str:
-    """Major, minor and revision of the firmware; "" for another answer [LLCP, FirmwareRevision]."""
-    return ".".join(map(str, answer[:3])) if len(answer) >= 3 else ""
-
-
 def force_range_g(product: str) -> float | None:
     """Largest force in g of an MTi by its product code, as `MTi-3-8A7G6`; None if unknown."""
     match = re.match(r"MTi-(\d+)", product)
@@ -260,8 +255,10 @@ class MtxSetup:
     @property
     def _device_text(self) -> str:
         """Product and firmware, after a colon."""
-        firmware = firmware_text(self._answers.get(REQUEST_FIRMWARE.name, b""))
-        known = [self.product, f"firmware {firmware}" if firmware else ""]
+        firmware = self._answers.get(REQUEST_FIRMWARE.name, b"")[
+            :3
+        ]  # major, minor and revision [LLCP, FirmwareRevision]
+        known = [self.product, f"firmware {'.'.join(map(str, firmware))}" if len(firmware) == 3 else ""]
         return ": " + ", ".join(filter(None, known)) if any(known) else ""
 
     @property

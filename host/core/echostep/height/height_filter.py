@@ -53,14 +53,11 @@ class RidingHeight:
             if math.isnan(self.height_m):
                 self.height_m, self._hh, self._rr = height, self._height_m2, RATE_SD_M_S**2
             else:
-                self._carry_on(dt_s)
+                self.height_m += self._rate_m_s * dt_s
+                self._hh += (2.0 * self._hr + self._rr * dt_s) * dt_s + STARTING_M2_S3 * dt_s**3 / 3.0
+                self._hr += self._rr * dt_s + 0.5 * STARTING_M2_S3 * dt_s**2
+                self._rr += STARTING_M2_S3 * dt_s
                 self._correct(height)
-
-    def _carry_on(self, dt_s: float) -> None:
-        self.height_m += self._rate_m_s * dt_s
-        self._hh += (2.0 * self._hr + self._rr * dt_s) * dt_s + STARTING_M2_S3 * dt_s**3 / 3.0
-        self._hr += self._rr * dt_s + 0.5 * STARTING_M2_S3 * dt_s**2
-        self._rr += STARTING_M2_S3 * dt_s
 
     def _correct(self, height_m: float) -> None:
         off_m, variance = height_m - self.height_m, self._hh + self._height_m2

@@ -197,7 +197,8 @@ class StrideEstimator:
         window = np.column_stack([self._grid.thigh[first : k + 1], shank[first : k + 1]])
         rates = np.diff(window, axis=0) * GRID_HZ
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
-        if not leg_swings.is_still(smoothed):
+        calm = np.ptp(smoothed, axis=0) < leg_swings.STILL_RANGE_RAD_S
+        if not (calm & (np.abs(smoothed.mean(axis=0)) < leg_swings.STILL_MEAN_RAD_S)).all():
             if self._still_since is not None:
                 self._end_standing(k - 5)
                 self._still_since = None

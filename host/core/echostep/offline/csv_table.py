@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -26,6 +27,7 @@ from echostep.errors import EchostepError, replaced
 LONGEST_LINE = 10_000  # characters: no line of numbers is longer
 EARLY_ROWS = 2000  # rows after which a file of garbage is given up
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # byte order marks [Unicode 2.13]: Excel's "Unicode text"
+JSON = re.compile(rb"\s*[\[{]\s*[\[{\"]")  # begin of a file of objects
 SEPARATORS = ",;\t"
 MOST_BAD = 0.5  # share of rows without a number in a required column
 GREATEST = 1e19  # of any number: nanoseconds since 1970 have 19 digits
@@ -87,8 +89,8 @@ def open_samples(path: Path | str, read: Callable[[TextIO], Result]) -> Result:
             raise ValueError("no file, but a folder, pipe or device: write the samples to a file, and give that")
         with Path(path).open("rb") as begin:
             first = begin.read(32)
-        binary = "binary, not a table: export it as CSV" if b"\0" in first and first[:2] not in UTF_16 else ""
-        if what := replaced(first) or binary:
+        kind = "JSON" if JSON.match(first) else "binary" if b"\0" in first and first[:2] not in UTF_16 else ""
+        if what := replaced(first) or (kind and f"{kind}, not a table: export it as CSV"):
             raise ValueError(what)
         encoding = "utf-16" if first[:2] in UTF_16 else "utf-8-sig"
         with Path(path).open(newline=None, encoding=encoding, errors="replace") as file:
@@ -124,7 +126,9 @@ def read_rows(lines: Iterator[str], header: tuple[list[str], str], columns: Sequ
         raise ValueError("no samples")
     if limits.early_rows is not None and bad > MOST_BAD * len(numbers):
         share = f"{100 * bad / len(numbers):.0f} % of the first {len(numbers)} rows"
-        raise ValueError(f"{share} have no number in some column, or more cells than there are names")
+        raise ValueError(
+            f"{share} have no number in some column, or more cells than there are names: each row needs all"
+        )
     return CsvTable(np.array(values).reshape(-1, len(columns)), np.array(numbers))
 
 

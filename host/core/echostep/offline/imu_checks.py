@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echostep.arrays import Floats, spans
+from echostep.arrays import Bools, Floats, spans
 from echostep.foot.steps import Track
 from echostep.foot.zupt_ins import STEEP_M_S2, STEEP_RAD_S
 from echostep.ports.imu_samples import BACK_SHARE, FORCE, RATE, TIME, time_complaint, unit_complaint
@@ -23,7 +23,13 @@ SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
-WRAPS_S = (2**32 * 1e-6, 2**32 * 1e-3, 2**16 * 1e-3)  # of counters in microseconds or milliseconds
+WRAPS_S = (
+    2**32 * 1e-6,
+    2**32 * 1e-4,
+    2**32 * 1e-3,
+    2**16 * 1e-3,
+)  # of counters in microseconds, tenths of a millisecond, milliseconds
+ROOM = 1.5  # periods between two neighbours, between which there is a place
 LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 MISSING_SHARE = 0.02  # share of missing samples that is reported
 CLIPPED_SHARE = 1e-3  # least share of readings at the limit that is reported
@@ -44,8 +50,8 @@ LEAST_FAULT = 0.1  # excess of the force at rest that may be why a track is no f
 
 
 def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows measured anew, with a number in each of the first seven columns (0 or -9999 on all axes is none), and notes on those left out."""
-    filled = np.ptp(table[:, FORCE], axis=1) + np.ptp(table[:, RATE], axis=1) == 0.0
+    """The rows measured anew, with a number in each of the first seven columns, and notes on those left out."""
+    filled = is_filled(table)
     whole = np.isfinite(table[:, :SENSOR_COLUMNS]).all(axis=1) & ~(filled & (filled.mean() < DEAD_SHARE))
     held = np.zeros(len(table), np.bool_)
     for begin, end in spans((np.diff(table[:, FORCE.start : RATE.stop], axis=0) == 0.0).all(1)).tolist():
@@ -55,24 +61,49 @@ def whole_rows(table: Floats) -> tuple[Floats, tuple[str, ...]]:
     return table[whole & ~held], tuple(f"{int(rows.sum())} rows {what}" for what, rows in found.items() if rows.any())
 
 
-def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """The rows sorted by time, with a note, if that makes the times regular; counters that wrap go on. Raises ValueError for a restarted clock."""
-    t_s = table[:, TIME]
+def is_filled(table: Floats) -> Bools:
+    """Whether each row (n,) has the same number on all axes of a sensor, as 0 or -9999 in place of a sample."""
+    filled: Bools = np.ptp(table[:, FORCE], axis=1) + np.ptp(table[:, RATE], axis=1) == 0.0
+    return filled
+
+
+def unwrapped(t_s: Floats, period_s: float) -> Floats:
+    """The times (n,) of samples in such periods, with counters that wrap going on."""
     for wrap_s in WRAPS_S:
-        steps = np.diff(t_s, prepend=t_s[:1])
-        near_s = min(LATEST * float(np.median(np.abs(steps))), 0.01 * wrap_s) if len(steps) else 0.0
-        t_s += wrap_s * np.cumsum(np.abs(steps + wrap_s) < near_s)
+        near_s = min(LATEST * period_s, 0.01 * wrap_s)
+        t_s = t_s + wrap_s * np.cumsum(np.abs(np.diff(t_s, prepend=t_s[:1]) + wrap_s) < near_s)
+    return t_s
+
+
+def out_of_line(t_s: Floats, period_s: float) -> Bools:
+    """Whether each time (n,) is outside of its two neighbours', which have a place for it: a single wrong stamp. The ends have one neighbour."""
+    before, at, after = t_s[:-2], t_s[1:-1], t_s[2:]
+    return np.concatenate([[False], (after - before > ROOM * period_s) & ((at < before) | (at > after)), [False]])[
+        : len(t_s)
+    ]
+
+
+def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """The rows sorted by time, with notes, if that makes the times regular; counters that wrap go on. Raises ValueError for a restarted clock."""
+    period_s = float(np.median(np.abs(np.diff(table[:, TIME])))) if len(table) > 1 else 0.0
+    table[:, TIME] = unwrapped(table[:, TIME], period_s)
+    off = out_of_line(table[:, TIME], period_s)
+    table, found = (
+        table[~off],
+        (f"{int(off.sum())} times are out of line with their neighbours': skipped",) * bool(off.any()),
+    )
+    t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if not back:
-        return table, ()
+        return table, found
     order = np.argsort(t_s, kind="stable")
     ahead, steps = (each[each > 0.0] for each in (np.diff(t_s), np.diff(t_s[order])))
     apart = back == 1 and len(steps) and t_s[0] - t_s[-1] > LATEST * np.median(steps)
     if len(steps) and back < BACK_SHARE * len(t_s) and (apart or np.median(steps) < 0.75 * np.median(ahead)):
         raise ValueError("t_s begins anew within the file: are these several recordings? Cut it there")
     if len(steps) and float((steps < 0.5 * np.median(steps)).mean()) < REGULAR_SHARE:
-        return table[order], (f"{back} rows were not in the order of t_s: sorted by it",)
-    return table, ()
+        return table[order], (*found, f"{back} rows were not in the order of t_s: sorted by it")
+    return table, found
 
 
 def complaint(table: Floats, columns: Sequence[str]) -> str:

@@ -227,7 +227,9 @@ class Tracker:
         tracked = self._filter_from(measured)
         if tracked is None:
             return []
-        readings, meetings = self._pop_readings(segment.t1_s), self._meetings.pop(segment.t1_s)
+        readings = [reading for reading in self._readings if reading.t_s <= segment.t1_s]
+        self._readings = [reading for reading in self._readings if reading.t_s > segment.t1_s][-MAX_READINGS:]
+        meetings = self._meetings.pop(segment.t1_s)
         meetings += self._team_beacons.ranges(readings, self.gateway.numbers)
         if self._before and not self._before.add(measured, readings, meetings):
             self._before = None
@@ -268,12 +270,6 @@ class Tracker:
         tracked.set_ranger_model(echo_of(self._ranger_part, self.settings.echo))
         effects = [tracked.meet(on_the_way(meeting, measured.segment, t_s)) for t_s, meeting in meetings]
         return tracked.update(measured, readings), effects
-
-    def _pop_readings(self, t_s: float) -> list[BeaconReading]:
-        """The waiting beacon readings up to a time."""
-        ready = [reading for reading in self._readings if reading.t_s <= t_s]
-        self._readings = [reading for reading in self._readings if reading.t_s > t_s][-MAX_READINGS:]
-        return ready
 
     def _publish(self, measured: MeasuredSegment | None, new: Estimate) -> Estimate:
         """Call the watchers with a new estimate; its time is never before an earlier estimate's.

@@ -68,7 +68,10 @@ def tracker_of(
         text = metadata.get("settings_toml", "") if settings is None else read_settings(settings)
         settings = parse_settings(text, str(path if settings is None else settings), recorded=settings is None)
     start = start or recorded_start(metadata, path)
-    seed = recorded_seed(metadata, path) if seed is None else seed
+    try:
+        seed = int(metadata.get("seed", "0")) if seed is None else seed
+    except ValueError as error:
+        raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
     return Tracker(plan, start, settings, seed, waits=metadata.get("start") == CHECK_IN_START)
 
 
@@ -93,14 +96,6 @@ def recorded_start(metadata: Mapping[str, str], path: Path) -> Pose | Start | No
         return Start(pose, sd_m, sd_rad, air=possible(pause.air), after_pause=True)
     except (ValueError, OverflowError, RecursionError, msgspec.MsgspecError) as error:
         raise EchostepError(f"{path}: its recorded start is damaged: give one with --start X,Y,DEG") from error
-
-
-def recorded_seed(metadata: Mapping[str, str], path: Path) -> int:
-    """The seed of a recorded run, 0 if missing; raises EchostepError when it is damaged."""
-    try:
-        return int(metadata.get("seed", "0"))
-    except ValueError as error:
-        raise EchostepError(f"{path}: its recorded seed is damaged: give one with --seed N") from error
 
 
 def possible(air: Air | None) -> Air | None:

@@ -104,14 +104,9 @@ def replay(
     """
     paths = [recording] if isinstance(recording, Path | str) else recording
     opened = open_parts([Path(path) for path in paths])
-    on = NO_PLAN if plan is None else plan if isinstance(plan, Plan) else open_plan(Path(plan))
+    importer = added("plans") or load_plan  # plans of other formats, if a distribution adds importers
+    on = NO_PLAN if plan is None else plan if isinstance(plan, Plan) else importer(Path(plan))
     tracker = tracker_of(opened, on, start, settings, seed)
     estimates = [e for portion in opened.portions() for e in tracker.take(portion)]
     refuse_none(estimates, opened.path)
     return Walk(shown_name(opened.path, opened.metadata), on, tuple(estimates))
-
-
-def open_plan(path: Path) -> Plan:
-    """A plan.json, or a plan of another format if a distribution adds importers. Raises EchostepError."""
-    importer = added("plans")
-    return importer(path) if importer else load_plan(path)

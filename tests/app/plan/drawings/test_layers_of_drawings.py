@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from ezdxf.enums import TextEntityAlignment
-from ezdxf.math import Matrix44
+from ezdxf.math import Matrix44, Vec3
+from ezdxf.render.mesh import MeshBuilder
 
 from echostep.errors import EchostepError
 from echostep.plan import Plan
@@ -38,9 +39,13 @@ def body(entity: Any) -> None:
     entity.sat = ["400 0 1 0", "nobody reads this"]
 
 
-def mesh(entity: Any) -> None:
-    with entity.edit_data() as data:
-        data.vertices, data.faces = [(1, 1, 0), (2, 1, 0), (2, 2, 0)], [(0, 1, 2)]
+def body_of(x: float) -> Any:
+    """A wall as faces in space."""
+    mesh = MeshBuilder()
+    mesh.add_mesh(
+        vertices=Vec3.list([(x, 20, 0), (x + 0.2, 20, 0), (x + 0.2, 24, 3), (x, 24, 3)]), faces=[(0, 1, 2, 3)]
+    )
+    return mesh
 
 
 def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
@@ -63,6 +68,8 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
     }  # fmt: skip
     lines |= {
         "HELIX": lambda x: space.add_helix(0.5, 1, 2, dxfattribs=WALL).transform(Matrix44.translate(x, 22, 0)),
+        "MESH": lambda x: body_of(x).render_mesh(space, dxfattribs=WALL),
+        "polyface mesh": lambda x: body_of(x).render_polyface(space, dxfattribs=WALL),
         "MPOLYGON": lambda x: space.add_mpolygon(dxfattribs=WALL).paths.add_polyline_path(corners((x, 20, x + 0.2, 24)), is_closed=True),
     }  # fmt: skip
     counted: dict[str, Callable[[], Any]] = {
@@ -73,8 +80,6 @@ def test_every_kind_of_entity_is_a_wall_or_counted(tmp_path: Path) -> None:
         "LEADER": lambda: space.add_leader([(1, 1), (2, 2), (3, 2)], dxfattribs=WALL),
         "SHAPE": lambda: space.add_shape("X", dxfattribs=WALL),
         "ATTDEF": lambda: space.add_attdef("T", (1, 1), "x", dxfattribs=WALL),
-        "MESH": lambda: mesh(space.add_mesh(dxfattribs=WALL)),
-        "POLYLINE": lambda: space.add_polymesh((3, 3), dxfattribs=WALL),
         "IMAGE": lambda: space.add_image(doc.add_image_def("a.png", (9, 9)), (1, 1), (3, 3), dxfattribs=WALL),
         "PDFUNDERLAY": lambda: space.add_underlay(doc.add_underlay_def("a.pdf"), (1, 1), dxfattribs=WALL),
         "INSERT without contents": lambda: space.add_blockref(doc.blocks.new("EMPTY").name, (1, 1), dxfattribs=WALL),

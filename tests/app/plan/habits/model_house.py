@@ -89,6 +89,12 @@ def elevations_0(made: Model) -> None:
         storey.Elevation = 0.0
 
 
+def spaces_below(made: Model) -> None:
+    """Rooms a storey lower than the storey that they belong to."""
+    for k, space in enumerate(made.file.by_type("IfcSpace")):
+        made._put(space, 0.1 + 5.0 * (k % 2), 0.1, 3.0 * (k // 2) - 3.0, 0.0)
+
+
 def wide_doors(made: Model) -> None:
     for door in made.file.by_type("IfcDoor"):
         door.OverallWidth = 2000.0

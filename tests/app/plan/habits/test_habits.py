@@ -327,6 +327,7 @@ MODELS = [
     *cells("ifc", "datum", partial(model.write, change=lambda made: georeference.add_georeferencing(made.file)), asks="map conversion"),
     *cells("ifc", "contradictions", partial(model.write, change=model.storeys_at_0), asks="^note: .*6.00 m.: Elevation is taken", right=SOLID),
     *cells("ifc", "contradictions", partial(model.write, change=model.elevations_0), asks="^note: .*0.00 m.: placement is taken", right=SOLID),
+    *cells("ifc", "contradictions", partial(model.write, change=model.spaces_below), asks="4 rooms .* lie at another height than the storey"),
     *cells("ifc", "contradictions", partial(model.write, change=model.wide_doors), asks="OverallWidth and opening of 4 doors differ"),
     *cells("ifc", "solid walls", partial(model.write, voids=False), right=SOLID),
     *cells("ifc", "solid walls", partial(model.write, voids=False, thick=0.4), right=Right(0.4)),

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from echostep.plan import Connector, Level, Plan, Pose, Room
+from echostep.plan import Connector, Level, Plan, Room
 from echostep_app.plan.cropping import Bounds, extent, within
 from echostep_app.plan.pictures.labels import Label, draw_labels, fonts_for
 from echostep_app.plan.pictures.symbols import exit_lines
@@ -181,7 +181,8 @@ def _draw_level(axes: Any, plan: Plan, level_index: int, view: View, findings: S
     _lines(axes, level.doubtful, view, OBSTACLE, 0.9)
     _lines(axes, np.array([door.line for door in level.doors]).reshape(-1, 4), view, DOOR, 1.1)
     if plan.start is not None and plan.start.level == level_index:
-        _draw_start(axes, plan.start)
+        marker = (3, 0, math.degrees(plan.start.heading_rad) - 90)  # a triangle that points along the heading
+        axes.plot(plan.start.x_m, plan.start.y_m, marker=marker, color=WAY, markersize=9, zorder=6)
     for row in exit_lines(plan, level_index).tolist():
         _draw_exit(axes, *row)
     for finding in findings:
@@ -238,12 +239,6 @@ def _draw_legend(figure: Figure, plan: Plan, levels: Sequence[int], more: Sequen
     )
     if handles := [*(handle for handle, is_drawn in kinds if is_drawn), *more]:
         figure.legend(handles=handles, loc="outside lower center", ncols=8, fontsize=7, frameon=False)
-
-
-def _draw_start(axes: Any, start: Pose) -> None:
-    """A triangle at the start that points along its heading."""
-    marker = (3, 0, math.degrees(start.heading_rad) - 90)
-    axes.plot(start.x_m, start.y_m, marker=marker, color=WAY, markersize=9, zorder=6)
 
 
 def _draw_exit(axes: Any, x0: float, y0: float, x1: float, y1: float) -> None:

@@ -39,11 +39,11 @@ class Label:
 def fonts_for(texts: Iterable[str]) -> Iterator[str]:
     """Draw inside with fonts that have the letters of these texts; gives the letters that no installed font has, which are drawn as boxes."""
     import matplotlib as mpl
-    from matplotlib.font_manager import fontManager
+    from matplotlib.font_manager import findfont, fontManager
 
     families = [BASE_FONT]
     missing = {letter for text in texts for letter in text if letter.isprintable() and not letter.isspace()}
-    missing -= _letters(_path_of(BASE_FONT))
+    missing -= _letters(str(findfont(BASE_FONT)))
     fonts = [font for font in fontManager.ttflist if not font.name.startswith("Last Resort")]  # its letters are boxes
     for font in sorted(fonts, key=lambda font: (font.style != "normal", font.weight not in (400, "normal"), font.name)):
         if missing and (found := missing & _letters(font.fname)):
@@ -52,12 +52,6 @@ def fonts_for(texts: Iterable[str]) -> Iterator[str]:
     with mpl.rc_context({"font.family": families}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
         yield "".join(sorted(missing))
-
-
-def _path_of(family: str) -> str:
-    from matplotlib.font_manager import findfont
-
-    return str(findfont(family))
 
 
 @cache

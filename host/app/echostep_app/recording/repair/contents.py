@@ -130,7 +130,7 @@ def info(path: Path) -> list[str]:
     if len(condition) == len(recovery.before):
         so_far = "it is being written: whole so far" if recovery.grows else "whole"
         condition.append(f"  {so_far}{', but made of a damaged recording' if recovery.before else ''}")
-    if is_mended_by_repair(recovery, contents):
+    if recovery.own_damage or contents.order.corrected or not (recovery.has_footer or recovery.grows):
         condition.append(f"  echostep repair {path} -o OUT makes a whole file of what is readable")
     return [printable(line) for line in [*_head(recovery, contents), *_port_lines(contents), *condition]]
 
@@ -145,10 +145,9 @@ def _head(recovery: Recovery, contents: Contents) -> list[str]:
     """Size, duration and metadata."""
     lines = [f"{recovery.path}: {recovery.size / 1e6:.1f} MB, {contents.seconds:.1f} s"]
     for key, value in recovery.metadata.items():
-        if value:
-            lines.append(
-                f"  {key}: {value if len(value) < LONGEST_VALUE and chr(10) not in value else _indented(value)}"
-            )
+        is_short = len(value) < LONGEST_VALUE and "\n" not in value
+        shown = value if is_short else "".join(f"\n    {line}" for line in value.splitlines())
+        lines += [f"  {key}: {shown}"] if value else []
     return [*lines, *_time_line(recovery.metadata)]
 
 
@@ -161,10 +160,6 @@ def _time_line(metadata: Mapping[str, str]) -> list[str]:
     return [
         "  times: of a clock that begins with the computer; echostep export FILE --plan PLAN -o NEW.mcap writes UTC"
     ]
-
-
-def _indented(text: str) -> str:
-    return "".join(f"\n    {line}" for line in text.splitlines())
 
 
 def _port_lines(contents: Contents) -> list[str]:
@@ -215,12 +210,6 @@ def problems_of(recovery: Recovery, contents: Contents) -> list[str]:
     lines += [end] if recovery.intact and not recovery.has_footer else []
     lines += [late] if contents.out_of_order else []
     return [f"  {line}" for line in lines]
-
-
-def is_mended_by_repair(recovery: Recovery, contents: Contents) -> bool:
-    """Whether a repaired copy lacks a fault of this file; bytes that the decoder could not read, and the order between ports, stay as they are."""
-    unfinished = not recovery.has_footer and not recovery.grows
-    return bool(recovery.own_damage or unfinished or contents.order.corrected)
 
 
 def with_progress(recovery: Recovery, contents: Contents, title: str) -> Iterator[RecordedMessage]:

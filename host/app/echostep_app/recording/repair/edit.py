@@ -38,6 +38,7 @@ def repair(path: Path, out: Path) -> list[str]:
     """Write everything readable of a recording to a complete file; raises EchostepError when no message is readable."""
     recovery, saved = Recovery(path), Contents()
     with RewrittenRecording(out, path, recovery.schemas) as rewritten:
+        recovery.keep_private = rewritten.keep_private
         messages = with_progress(recovery, saved, f"repairing {path.name}")
         _copy(messages, rewritten, saved, lambda: recovery.metadata)
         if not saved.ports and not saved.derived:
@@ -60,7 +61,9 @@ def cut(path: Path, begin_s: float, end_s: float, out: Path) -> list[str]:
         raise EchostepError(
             f"--from {begin_s:g} --to {end_s:g}: expected 0 <= from < to, in seconds after the beginning"
         )
-    first_ns = _first_arrival_ns(path)
+    all_messages = ArrivalOrder().correct(Recovery(path).messages())
+    if (first_ns := next((m.t_ns for m in all_messages if port_of(m.channel)), None)) is None:
+        raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")
     begin_ns = first_ns + round(begin_s * 1e9)
     end_ns = first_ns + round(end_s * 1e9) if math.isfinite(end_s) else AFTER_ALL_NS
     start = _start_at(path, begin_ns) if begin_s > 0.0 else None
@@ -96,14 +99,6 @@ def _copy(
             rewritten.write_metadata(metadata())
         counted.add(message)
         rewritten.write(message)
-
-
-def _first_arrival_ns(path: Path) -> int:
-    """Arrival time of the first chunk in the file."""
-    for message in ArrivalOrder().correct(Recovery(path).messages()):
-        if port_of(message.channel):
-            return message.t_ns
-    raise EchostepError(f"{path}: no recorded bytes in it: is this an echostep recording (.mcap)?")
 
 
 def _start_at(path: Path, t_ns: int) -> str | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, compress, islice
 from pathlib import Path
@@ -24,10 +24,10 @@ from mcap.records import Channel, Header, Metadata, Schema
 from echostep.arrays import Bools, Octets
 from echostep.errors import EchostepError
 from echostep.recording import MCAP_MAGIC, is_being_written
+from echostep.recording.damage import scan
 from echostep.recording.damage.ending import begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage
 from echostep.recording.damage.placing import Placement
-from echostep.recording.damage.scan import CHUNK, begin_in_chunk, chunk_matches, map_file, next_valid_run, record_end
 from echostep.recording.mcap_records import (
     CHANNEL_IDS,
     DAMAGE_NAME,
@@ -43,6 +43,7 @@ from echostep.recording.mcap_records import (
 )
 
 PLACED_AT_ONCE = 8192  # messages whose places are decided together: some seconds of a walk; assumed
+PLACE = scan.PRIVATE, bytes(scan.CHUNK_HEAD - HEAD_SIZE)  # that the head of an open chunk will have
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -71,6 +72,7 @@ class Recovery:
     misnamed: set[str] = field(default_factory=set)  # topics of channels whose name or encoding is damaged
     library: str = ""  # by which the file was written
     before: list[str] = field(default_factory=list)  # damage of the recordings of which this one was made
+    keep_private: Callable[[int, bytes], None] = lambda _opcode, _body: None  # called with other programs' own records
     size: int = 0  # of the file, bytes
     byte_offset: int = 0  # of the record that was read last
     _is_channel: Bools = field(default_factory=lambda: np.zeros(CHANNEL_IDS, np.bool_))  # by channel number
@@ -83,7 +85,7 @@ class Recovery:
 
     def messages(self) -> Iterator[RecordedMessage]:
         """All readable messages in their place; raises EchostepError when the file cannot be read or is not an MCAP file."""
-        file = map_file(self.path)
+        file = scan.map_file(self.path)
         self.size, self.grows = len(file), is_being_written(self.path)
         if not begins_as_mcap(file):
             raise EchostepError(
@@ -125,13 +127,13 @@ class Recovery:
         view = file.data
         size = len(file)
         while begin < size:
-            end = record_end(file, begin, self._is_channel)
-            if (inside := begin_in_chunk(file, begin)) >= 0:
-                self.own_damage.altered |= not self.intact and end >= 0 and not chunk_matches(file, inside, end)
+            end = scan.record_end(file, begin, self._is_channel)
+            if (inside := scan.begin_in_chunk(file, begin)) >= 0:
+                self.own_damage.altered |= not self.intact and end >= 0 and not scan.chunk_matches(file, inside, end)
                 begin = inside
                 continue
             if end < 0:
-                end = next_valid_run(file, begin + 1, self._is_channel)
+                end = scan.next_valid_run(file, begin + 1, self._is_channel)
                 if self.grows and end == size:
                     return
                 yield begin, end, None
@@ -140,7 +142,7 @@ class Recovery:
             opcode, body = view[begin], begin + HEAD_SIZE
             if opcode == MESSAGE:
                 yield begin, end, self._message(view[body:end])
-            elif opcode == CHUNK:
+            elif opcode == scan.CHUNK:
                 yield begin, end, bytes(view[body:end])
             elif opcode == Opcode.FOOTER and end + len(MCAP_MAGIC) >= size:
                 self.has_footer = True
@@ -172,7 +174,7 @@ class Recovery:
         self.own_damage.unreadable_chunks += not whole
 
     def _register(self, opcode: int, body: bytes) -> None:
-        """Keep a channel, a schema, the recorder's name and its metadata; ignore other records."""
+        """Keep a channel, a schema, the recorder's name and its metadata, and what other programs keep; ignore other records."""
         if opcode == Opcode.CHANNEL and (channel := parse_record(Channel, body)):
             if self._settled and channel.id in self.channels:
                 return
@@ -189,6 +191,8 @@ class Recovery:
                 self.metadata = dict(stored.metadata)
             elif stored.name == DAMAGE_NAME:
                 self.before = list(stored.metadata.values())
+        elif opcode >= scan.PRIVATE and (opcode, body) != PLACE:
+            self.keep_private(opcode, body)
 
 
 MOST_WAITING = 4096  # messages: some seconds of a walk, while another port is silent

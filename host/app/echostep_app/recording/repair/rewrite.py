@@ -56,6 +56,13 @@ class RewrittenRecording:
             self._writer.add_message(number, message.t_ns, message.body, message.publish_ns, self._sequence)
         self._sequence += 1
 
+    def keep_private(self, opcode: int, body: bytes) -> None:
+        """Write another program's own record, before the chunk of the next message."""
+        records = self._writer._Writer__record_builder  # type: ignore[attr-defined]  # its checksum must cover the record
+        records.start_record(opcode)
+        records.write(body)
+        records.finish_record()
+
     def _register(self, channel: Channel, key: tuple[str, str, int]) -> int:
         if channel.schema_id not in self._schema_ids and (schema := self._schemas.get(channel.schema_id)):
             self._schema_ids[schema.id] = self._writer.register_schema(schema.name, schema.encoding, schema.data)

@@ -72,8 +72,8 @@ class LineFoot:
     def report(self) -> str:
         """The lines read, in words."""
         return (
-            f"foot in lines: {self.rate_hz:g} Hz; {self._reader.unreadable} lines were no sample, {self._chunks.left_out} samples came within "
-            f"the period of another, the device's clock was set {self._chunks.jumps} times"
+            f"foot in lines: {self.rate_hz:g} Hz; {self._reader.unreadable} lines were no sample, {self._chunks.off} times were out of line, "
+            f"{self._chunks.left_out} samples came within the period of another, the device's clock was set {self._chunks.jumps} times"
         )
 
     def _listen(self, ports: SerialPorts, header: str) -> np.ndarray:

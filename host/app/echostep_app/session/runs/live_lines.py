@@ -16,6 +16,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.offline.csv_table import CsvLimits, column_of, number_of
 from echostep.offline.header import Header
+from echostep.offline.imu_checks import ROOM, is_filled, out_of_line, unwrapped
 from echostep.offline.imu_csv import COLUMNS
 from echostep.ports.chunks import Chunk
 from echostep_app.offline.foreign_columns import read_header
@@ -57,7 +58,7 @@ class LineReader:
         if self._columns is None:
             return None
         values = self._columns.table(iter([line]), COLUMNS, 0, CsvLimits(early_rows=None)).values
-        return values if (np.abs(values) < MOST).all() else None
+        return values if (np.abs(values) < MOST).all() and not is_filled(values).any() else None
 
     def _name_columns(self, line: str) -> bool:
         """Take the names of the columns from a line; False if it has not all of them."""
@@ -68,8 +69,10 @@ class LineReader:
             lacks = min(column_of(head.names, name) for name in COLUMNS) < 0
         except ValueError:
             return False
-        if lacks or head.counts_hz is not None:
+        if lacks:
             return False
+        if head.counts_hz:
+            head = replace(head, factors={**head.factors, "t_s": 1.0 / head.counts_hz}, counts_hz=None)
         self.header, self._columns = line, head
         return True
 
@@ -78,13 +81,19 @@ _LINE_ENDS = bytes.maketrans(b"\0\r", b"\n\n")
 
 
 class LineChunks:
-    """Samples as chunks that arrive when their bytes did. `jumps`: how often the device's clock was set. `left_out`: as of `ImuChunks`."""
+    """Samples as chunks that arrive when their bytes did. `jumps`: how often the device's clock was set. `left_out`: as of `ImuChunks`.
+
+    `off`: times out of line with their neighbours'. A sample that does not follow the one before by a period waits for the next one.
+    """
 
     def __init__(self, rate_hz: float) -> None:
-        self.jumps = 0
-        self._chunks = ImuChunks(rate_hz)
+        self.jumps = self.off = 0
+        self._chunks, self._period_s = ImuChunks(rate_hz), 1.0 / rate_hz
+        # The newest sample in line, and one that waits: time of arrival (s), sample
+        self._given, self._waiting = np.empty((2, 0, 1 + len(COLUMNS)))
+        self._wrapped_s = 0.0  # by which the device's counter has wrapped
         # Added to the device's times; of the newest sample
-        self._set_s, self._newest_s, self._arrival_ns = (0.0, math.nan, 0)
+        self._set_s, self._newest_s, self._arrival_s = 0.0, math.nan, 0.0
 
     @property
     def left_out(self) -> int:
@@ -93,14 +102,30 @@ class LineChunks:
 
     def of(self, samples: Floats, arrival_ns: int) -> Iterator[Chunk]:
         """Chunks of samples (n, 7)."""
-        samples = samples.copy()
-        for row in samples:
-            passed_s = (arrival_ns - self._arrival_ns) * 1e-9
-            if abs(row[0] + self._set_s - self._newest_s - passed_s) > JUMP_S:
+        rows = self._in_line(np.insert(samples, 0, 1e-9 * arrival_ns, axis=1))
+        t_s = rows[:, 1].copy()
+        for k, came_s in enumerate(rows[:, 0].tolist()):
+            passed_s = came_s - self._arrival_s
+            if abs(t_s[k] + self._set_s - self._newest_s - passed_s) > JUMP_S:
                 self.jumps += 1
-                self._set_s = self._newest_s + passed_s - row[0]
-            row[0] += self._set_s
-            if not row[0] <= self._newest_s:
-                self._newest_s, self._arrival_ns = float(row[0]), arrival_ns
-        for chunk in self._chunks.of(samples[:, 0], samples[:, 1:4], samples[:, 4:7]):
+                self._set_s = self._newest_s + passed_s - t_s[k]
+            t_s[k] += self._set_s
+            if not t_s[k] <= self._newest_s:
+                self._newest_s, self._arrival_s = float(t_s[k]), came_s
+        for chunk in self._chunks.of(t_s, rows[:, 2:5], rows[:, 5:8]):
             yield replace(chunk, t_arrival_ns=arrival_ns)
+
+    def _in_line(self, rows: Floats) -> Floats:
+        """These samples and the one that waited (n, 8), without those out of line and one that has to wait."""
+        rows[:, 1] += self._wrapped_s
+        known = np.concatenate([self._given, self._waiting, rows])
+        t_s = unwrapped(known[:, 1], self._period_s)
+        self._wrapped_s += float((t_s - known[:, 1])[-1:].sum())
+        known[:, 1] = t_s
+        off = out_of_line(t_s, self._period_s)
+        self.off += int(off.sum())
+        known = known[~off]
+        follows = 0.0 < np.diff(known[-2:, 1]).sum() < ROOM * self._period_s or len(known) < 2
+        done = len(known) if follows else len(known) - 1
+        begin, self._given, self._waiting = len(self._given), known[:done][-1:], known[done:]
+        return known[begin:done]

@@ -3,8 +3,9 @@
 
 In: the bytes of a file. Out: offsets of records, and of the next valid ones after damage. Owns nothing.
 
-A record is valid when its opcode and its length are possible, and, for a message, when its channel is known. After any other record the scan goes on
-at the next offset from which several consecutive records are valid.
+A record is valid when its opcode and its length are possible, and, for a message, when its channel is known; a private record, when no valid ones are
+in it, and it is no message with one wrong bit. After any other record the scan goes on at the next offset from which several consecutive records are
+valid.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESS
 
 # [MCAP format specification]
 CHUNK, CHUNK_HEAD = 0x06, HEAD_SIZE + 40  # opcode; bytes before the records of a chunk that is not compressed
-LAST_OPCODE, PRIVATE = 0x0F, 0x80  # of the specification; of the place that `open_chunk` keeps for the head of a chunk
+LAST_OPCODE, PRIVATE = (
+    0x0F,
+    0x80,
+)  # of the specification; the first of other programs, and of the place that `open_chunk` keeps for a chunk's head
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
@@ -44,24 +48,53 @@ def map_file(path: Path) -> Octets:
 @kernel
 def record_end(file: Octets, begin: int, is_channel: Bools) -> int:
     """Offset after the record at `begin`; -1 when that record is not valid."""
+    end = _possible_end(file, begin, is_channel)
+    if end < 0 or file[begin] < PRIVATE or (file[begin] == PRIVATE and end == begin + CHUNK_HEAD):
+        return end
+    for inside in range(begin + HEAD_SIZE, end):
+        if _is_run(file, inside, is_channel):
+            return -1
+    return end
+
+
+@part
+def _is_run(file: Octets, begin: int, is_channel: Bools) -> bool:
+    """Whether `VALID_RUN` consecutive records, or all up to the end, are possible from `begin` on."""
+    offset, records = begin, 0
+    while records < VALID_RUN and offset >= 0:
+        offset = _possible_end(file, offset, is_channel)
+        records += 1
+        if offset == len(file) or offset == len(file) - len(MCAP_MAGIC):
+            return True
+    return offset >= 0
+
+
+@part
+def _possible_end(file: Octets, begin: int, is_channel: Bools) -> int:
+    """Offset after the record at `begin`; -1 when its head is impossible."""
     body = begin + HEAD_SIZE
     if body > len(file):
         return -1
     opcode, length = file[begin], read_uint(file, begin + 1, 8)
     if not _is_opcode(opcode) or not 0 <= length <= min(RECORD_LIMIT, len(file) - body):
         return -1
+    is_message = length >= MESSAGE_SIZE and is_channel[read_uint(file, body, 2)]
     if opcode == MESSAGE:
-        if length < MESSAGE_SIZE or not is_channel[read_uint(file, body, 2)]:
-            return -1
-        return body + length if length <= LARGE or _may_follow(file, body + length) else -1
-    if opcode == PRIVATE:
-        return body + length if body + length == begin + CHUNK_HEAD else -1
-    return body + length if opcode == CHUNK or length <= OTHER_LIMIT else -1
+        possible = is_message and (length <= LARGE or _may_follow(file, body + length))
+    elif opcode > LAST_OPCODE:
+        possible = (
+            length <= OTHER_LIMIT
+            and not (opcode - PRIVATE == MESSAGE and is_message)
+            and _may_follow(file, body + length)
+        )
+    else:
+        possible = opcode == CHUNK or length <= OTHER_LIMIT
+    return body + length if possible else -1
 
 
 @part
 def _is_opcode(opcode: int) -> bool:
-    return 1 <= opcode <= LAST_OPCODE or opcode == PRIVATE
+    return 1 <= opcode <= LAST_OPCODE or opcode >= PRIVATE
 
 
 @part
@@ -90,12 +123,6 @@ def chunk_matches(file: Octets, records: int, end: int) -> bool:
 def next_valid_run(file: Octets, first: int, is_channel: Bools) -> int:
     """Smallest offset >= `first` from which `VALID_RUN` consecutive records, or all up to the end, are valid; the file's length if none."""
     for begin in range(first, len(file) - HEAD_SIZE + 1):
-        offset, records = begin, 0
-        while records < VALID_RUN and offset >= 0:
-            offset = record_end(file, offset, is_channel)
-            records += 1
-            if offset == len(file) or offset == len(file) - len(MCAP_MAGIC):
-                return begin
-        if offset >= 0:
+        if _is_run(file, begin, is_channel):
             return begin
     return len(file)

@@ -101,8 +101,9 @@ def _broken() -> tuple[type[Exception], ...]:
 
 
 def paths(entity: Any) -> Iterator[Any]:
-    """The outlines of an entity: one for lines and curves, several for hatches, multilines and polygons; none for texts and pictures."""
+    """The outlines of an entity: one for lines and curves, several for hatches, multilines and faces; none for texts and pictures."""
     from ezdxf import path
+    from ezdxf.render.mesh import MeshBuilder
 
     kind = entity.dxftype()
     if kind in PICTURES:
@@ -115,6 +116,9 @@ def paths(entity: Any) -> Iterator[Any]:
         yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in ("LINE", "ARC"))
     elif kind == "ACAD_PROXY_ENTITY":  # an object of another program, with lines that show it
         yield from (path.make_path(part) for part in entity.virtual_entities() if part.dxftype() in PROXY_LINES)
+    elif kind == "MESH" or (kind == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh)):
+        mesh = MeshBuilder.from_mesh(entity) if kind == "MESH" else MeshBuilder.from_polyface(entity)
+        yield from (path.from_vertices(face, close=True) for face in mesh.faces_as_vertices())
     else:
         yield path.make_path(entity)
 

@@ -17,27 +17,27 @@ from echostep.arrays import Floats, Ints
 from echostep_app.plan.importers.straight import pieces_of
 
 OPENINGS = ("*opening*", "*oeffnung*", "*öffnung*", "*ouverture*", "*abertura*", "*apertur*")  # in walls
-# Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Chinese, Japanese, Korean
+# Names in English (AIA) and German, Romance, Germanic and Slavic languages, Turkish, Indonesian, Chinese, Japanese, Korean
 LAYERS: dict[str, tuple[str, ...]] = {
     "walls": (
         "*wall*", "*partition*", "*masonry*", "*wand*", "*waend*", "*wände*", "*mauer*", "*mur*", "*cloison*", "*pared*", "*tabique*", "*parete*",
         "*pareti*", "*tramezz*", "*muur*", "*vägg*", "*vegg*", "*væg*", "*seinä*", "*scian*", "*ścian*", "*stěn*", "*стен*", "*перегород*", "*duvar*",
-        "*墙*", "*牆*", "*壁*", "*벽*",
+        "*dinding*", "*墙*", "*牆*", "*壁*", "*벽*",
     ),
-    "columns": ("*cols*", "*column*", "*stütz*", "*stuetz*", "*pfeiler*", "*poteau*", "*pilar*", "*colonn*", "*колонн*", "*kolon*", "*柱*"),
+    "columns": ("*cols*", "*column*", "*stütz*", "*stuetz*", "*pfeiler*", "*poteau*", "*pilar*", "*colonn*", "*колонн*", "*kolo[mn]*", "*柱*"),
     "windows": (
         "*wind*", "*glaz*", "*glas*", "*fenster*", "*ventana*", "*fenetre*", "*fenêtre*", "*finestr*", "*janela*", "*fönster*", "*vindu*", "*okno*",
-        "*okna*", "*окн*", "*pencere*", "*窗*", "*窓*", "*창*",
+        "*okna*", "*окн*", "*pencere*", "*jendela*", "*窗*", "*窓*", "*창*",
     ),
     "doors": (
-        "*door*", "*tür*", "*tuer*", "*puerta*", "*porte*", "*porta*", "*deur*", "*dør*", "*dörr*", "*drzwi*", "*dveř*", "*двер*", "*门*", "*門*",
-        "*扉*", "*ドア*", "*문*", *OPENINGS,
+        "*door*", "*tür*", "*tuer*", "*puerta*", "*porte*", "*porta*", "*deur*", "*dør*", "*dörr*", "*drzwi*", "*dveř*", "*двер*", "*pintu*", "*门*",
+        "*門*", "*扉*", "*ドア*", "*문*", *OPENINGS,
     ),
     "stairs": (
-        "*stair*", "*strs*", "*trepp*", "*escalier*", "*escalera*", "*scala*", "*escada*", "*schod*", "*лестн*", "*楼梯*", "*階段*",
+        "*stair*", "*strs*", "*trepp*", "*escalier*", "*escalera*", "*scala*", "*escada*", "*schod*", "*лестн*", "*tangga*", "*楼梯*", "*階段*",
     ),
     "lifts": ("*lift*", "*elev*", "*evtr*", "*aufzug*", "*ascens*", "*лифт*", "*电梯*"),
-    "rooms": ("*room*", "*raum*", "*space*", "*area-iden*", "*name*"),
+    "rooms": ("*room*", "*raum*", "*space*", "*ruang*", "*area-iden*", "*name*"),
     "obstacles": ("*obstacle*", "*hindernis*"),
 }  # fmt: skip
 BESIDE = (

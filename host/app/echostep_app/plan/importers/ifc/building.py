@@ -48,11 +48,17 @@ def import_ifc(path: Path, report: ImportReport) -> Plan:
     drawn_levels = [DrawnLevel(storey.name, storey.height_m) for storey in storeys]
     shapes = Shapes(path)
     shapes.find_origin(model.by_type("IfcWall") or model.by_type("IfcElement"))
-    count = 0
+    count, strays = 0, list[str]()
     for body in shapes.bodies(standing(model, SEEN, report), report):
         count += 1
         if why := _place(drawn_levels, body):
             report.leave_out(f"{body.element.is_a()} {why}")
+        elif body.element.is_a("IfcSpace") and not _at_home(drawn_levels, body):
+            strays.append(str(body.element.LongName or body.element.Name or f"#{body.element.id()}"))
+    if strays:
+        report.doubt(
+            f"{len(strays)} rooms ({', '.join(strays)[:120]}) lie at another height than the storey that they belong to: the height is taken"
+        )
     _doors(model, drawn_levels, shapes, report)
     _tell(model, report)
     if not any(drawn.walls for drawn in drawn_levels):
@@ -132,6 +138,13 @@ def _place(drawn_levels: list[DrawnLevel], body: SolidBody) -> str:
         else:
             drawn.rooms += [room(name or "room", area) for area in body.cut(drawn.height_m + CUT_M)]
     return "" if levels else NO_STOREY
+
+
+def _at_home(drawn_levels: list[DrawnLevel], body: SolidBody) -> bool:
+    """Whether a room is at the height of the storey that it belongs to; true where that is no level."""
+    (low, high), storeys = body.z_m, [str(relation.RelatingObject.Name) for relation in body.element.Decomposes]
+    own = [drawn for drawn in drawn_levels if drawn.name in storeys]
+    return not own or any(low <= drawn.height_m + CUT_M <= high for drawn in own)
 
 
 def _place_way(drawn_levels: list[DrawnLevel], body: SolidBody, kind: ConnectorKind, name: str) -> str:

@@ -69,7 +69,9 @@ def doors_at(point: Point, walls: Sequence[LineString], width_m: float, within_m
     """A door at an opening that is drawn as a point, in each of the walls (boundaries) near it."""
     near = [wall for wall in walls if wall.distance(point) < within_m]
     doors = _doors_at(point, near, width_m, within_m)
-    return [door for k, door in enumerate(doors) if all(_apart(door, other) for other in doors[:k])]
+    lines = [LineString((door.line[:2], door.line[2:])) for door in doors]
+    alone = (all(line.distance(other) > ONE_LINE_M for other in lines[:k]) for k, line in enumerate(lines))
+    return [door for door, is_alone in zip(doors, alone, strict=True) if is_alone]
 
 
 def _doors_at(point: Point, walls: Sequence[LineString], width_m: float, within_m: float) -> list[Door]:
@@ -124,9 +126,3 @@ def _door(piece: Floats, at: Floats, width_m: float) -> Door:
     return Door(
         (round(float(x0), 3), round(float(y0), 3), round(float(x1), 3), round(float(y1), 3)), "unknown", ASSUMED
     )
-
-
-def _apart(one: Door, other: Door) -> bool:
-    """Whether two doors are in different walls."""
-    lines = [LineString((door.line[:2], door.line[2:])) for door in (one, other)]
-    return bool(lines[0].distance(lines[1]) > ONE_LINE_M)

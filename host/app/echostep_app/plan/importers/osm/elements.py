@@ -128,7 +128,8 @@ def read_osm(path: Path) -> Elements:
         elements = Elements()
         for row in rows:
             _add(elements, row)
-        _resolve(elements)
+        for key, nodes in elements.ways.items():  # an extract cuts ways at its edge
+            elements.ways[key] = [node for node in nodes if node in elements.degrees]
     return elements
 
 
@@ -240,9 +241,3 @@ def _ref(value: Any, where: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise ValueError(f"{where}: {str(value)[:20]!r} is not the id of an element")
     return value
-
-
-def _resolve(elements: Elements) -> None:
-    """Remove nodes that the file does not contain from ways: an extract cuts ways at its edge."""
-    for key, nodes in elements.ways.items():
-        elements.ways[key] = [node for node in nodes if node in elements.degrees]
