@@ -20,16 +20,14 @@ from echostep.additions import added
 from echostep.errors import EchostepError, words_of
 from echostep.kernel_cache import on_compiling
 
-COLLECTED_AFTER = (
-    50_000  # new objects: what is imported stays, and looking for garbage in it after each 700 took a tenth of a replay
-)
 WHOLE = "pages, teams, live runs, plans of other formats and the other commands: pip install 'echostep[app]'"
 
 
 def main() -> None:
     """Entry point."""
-    gc.set_threshold(COLLECTED_AFTER)
-    atexit.register(gc.freeze)  # what is left at the end need not be taken apart, a fifth of a replay
+    # New objects. All that is imported stays: to look for garbage in it after each 700 took a tenth of a replay, to take it apart at the end a fifth.
+    gc.set_threshold(50_000)
+    atexit.register(gc.freeze)
     if whole := added("commands"):
         whole()
         return

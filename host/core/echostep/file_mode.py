@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Mode of the files of a run: readable by its user alone, unless `--share` was given.
+"""Files of a run: readable by its user alone, unless `--share` was given; whether one is being written.
 
-In: a path that is about to be written. Out: a file of mode 0600 there. Owns the answer to `--share`.
+In: a path. Out: a file of mode 0600 there; whether a process has locked it, as the recorder does. Owns the answer to `--share`.
 
 A recording shows where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation
 read, are written meanwhile.
@@ -13,6 +13,12 @@ import os
 from itertools import count
 from pathlib import Path
 
+try:
+    import fcntl
+except ImportError:  # Windows: there an open file cannot be removed
+    fcntl = None  # type: ignore[assignment]
+
+SUFFIX = ".mcap"  # of a recording
 PRIVATE, SHARED = 0o600, 0o666  # of a new file; the umask may take away more
 _share: list[bool] = []  # not empty: `--share`
 
@@ -40,3 +46,17 @@ def keep_earlier(path: Path) -> Path:
         names = (path.with_stem(f"{path.stem}-{number:04}") for number in count(1))
         path.rename(next(name for name in names if not os.path.lexists(name)))
     return path
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a process has locked the file."""
+    if fcntl is None:
+        return False
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:  # a file system without locks
+            return False
+    return False

@@ -20,7 +20,7 @@ from echostep.localization import Estimate, Start, TrackStatus
 from echostep.plan import NO_PLAN, Pose
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import LastPlace, last_place
+from echostep.tracker.state import LastPlace, last_place
 from echostep.walk.recorded import recorded_start
 from echostep_app.session.last_place import FILE, KEPT_S, Kept, PlaceKeeper, read_kept, start_last
 from echostep_app.session.metadata import parse_start, run_metadata

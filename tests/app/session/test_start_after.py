@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from echostep.height.levels import Air, ClimbSettings
-from echostep.tracker.last_place import LastPlace
+from echostep.tracker.state import LastPlace
 from echostep_app.session.last_place import MOVED_M, start_after
 from echostep_simulation.world.tower import STOREY_M
 

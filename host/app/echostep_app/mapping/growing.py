@@ -18,7 +18,7 @@ from echostep_app.mapping.graph.bias import find_bias, without_bias
 from echostep_app.mapping.graph.directions import right_angles_off
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.levels import find_levels
-from echostep_app.mapping.graph.nodes import Nodes, nodes_of
+from echostep_app.mapping.graph.nodes import nodes_of
 from echostep_app.mapping.mapper import Mapped, close_loops, find_pieces, find_walls, new_graph
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings
 from echostep_app.mapping.walls.drawing import draw
@@ -48,7 +48,9 @@ class GrowingMap:
         fragments, directions = find_pieces(nodes, pings)
         graph, solved, first = new_graph(nodes, fragments, directions), self._solved, 0
         graph.levels = find_levels(self._segments, nodes)
-        if solved is not None and _begins_alike(solved.nodes, nodes) and _same(solved.base_rad, graph.base_rad):
+        # Headings in hindsight may make a turn on the spot large enough for a node, or too small
+        is_first = solved is not None and np.array_equal(solved.nodes.t_s, nodes.t_s[: len(solved.nodes)])
+        if solved is not None and is_first and _same(solved.base_rad, graph.base_rad):
             first, graph.base_rad = len(solved.nodes) - 1, solved.base_rad
             graph.pose = _continued(solved.pose, graph.pose)
             graph.closures = solved.closures
@@ -59,11 +61,6 @@ class GrowingMap:
             find_walls(graph)
         self._solved = graph
         return Mapped(graph, pings, draw(graph, pings), directions, tuple(undone))
-
-
-def _begins_alike(solved: Nodes, nodes: Nodes) -> bool:
-    """Whether the solved nodes are the first ones: headings in hindsight may make a turn on the spot large enough for a node, or too small."""
-    return np.array_equal(solved.t_s, nodes.t_s[: len(solved)])
 
 
 def _same(a: float | None, b: float | None) -> bool:

@@ -24,14 +24,12 @@ WITHOUT_DATE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}  # equal
 
 def load_matplotlib() -> None:
     """Import matplotlib for a command: without the tables of properties in its documentation, which take a third of the time."""
-    from matplotlib import artist
+    from matplotlib import artist as artists
 
-    documented = artist.kwdoc
-    artist.kwdoc = lambda _: ""
-    try:
-        import matplotlib.figure  # noqa: F401
-    finally:
-        artist.kwdoc = documented
+    documented, artists.kwdoc = artists.kwdoc, lambda artist: ""  # noqa: ARG005
+    import matplotlib.figure  # noqa: F401
+
+    artists.kwdoc = documented
 
 
 def check_picture(path: Path) -> Path:

@@ -10,15 +10,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from echostep.ports.chunks import Chunk, Portion, portion_of
 from echostep_app.interruption import sleep
+from echostep_app.output.foxglove import log_line
 from echostep_app.printing.console import print_notices
 from echostep_app.printing.people import output_faults
-
-if TYPE_CHECKING:
-    from echostep_app.recording.recorder import Recorder
+from echostep_app.recording.recorder import Recorder
 
 LEAST_SLEEP_S = 0.02  # shorter waits are not worth a system call per chunk
 
@@ -56,8 +54,6 @@ def recorded(
     chunks: Iterable[Chunk | None], recorder: Recorder, *, wait_for_disk: bool = False
 ) -> Iterator[Chunk | None]:
     """Write each chunk before it is passed on, and a line on each fault of the output. `wait_for_disk`: for sources that can be slowed down."""
-    from echostep_app.output.foxglove import log_line
-
     told = 0
     for chunk in chunks:
         if chunk is not None:

@@ -22,7 +22,7 @@ from echostep.localization import Estimate, Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan, Pose
 from echostep.tracker import Tracker
-from echostep.tracker.last_place import LastPlace
+from echostep.tracker.state import LastPlace
 from echostep.walk.recorded import bounded, possible
 from echostep_app.session.metadata import LAST
 

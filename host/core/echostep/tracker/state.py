@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Copies of a tracker's state for views.
+"""Copies of a tracker's state for views, and where a run ended.
 
-In: nothing. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`. Owns nothing.
+In: the newest estimate; the cloud. Out: `TrackerState`, `StreamState`, `ParticleSnapshot`, `LastPlace`. Owns nothing.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,8 @@ from echostep.board.frames import FrameCounts
 from echostep.board.gateway import GatewayCounts
 from echostep.board.messages import Identity, Status
 from echostep.board.reports import BoardReports
-from echostep.localization import Estimate, MapFilter
+from echostep.height.levels import Air
+from echostep.localization import Estimate, MapFilter, TrackStatus
 from echostep.odometry import Alarm, FrontEndCounts
 from echostep.particles.kernels import systematic
 from echostep.path import PathSegment
@@ -99,3 +101,22 @@ class ParticleSnapshot:
             return cls(cloud.map_x_m.copy(), cloud.y_m.copy(), cloud.level.copy(), log_weight)
         chosen = systematic(cloud.weight, 0.5, most)
         return cls(cloud.map_x_m[chosen], cloud.y_m[chosen], cloud.level[chosen], np.zeros(most))
+
+
+@dataclass(frozen=True, slots=True)
+class LastPlace:
+    """A place (m) on a level that the tracker was sure of, `sd_m` its standard deviation per axis; `air`: of the barometer that was worn."""
+
+    x_m: float
+    y_m: float
+    sd_m: float
+    level: int
+    air: Air | None = None
+
+
+def last_place(estimate: Estimate | None, air: Air | None) -> LastPlace | None:
+    """The place of an estimate; None unless its status is `tracking`."""
+    if estimate is None or estimate.status is not TrackStatus.TRACKING:
+        return None
+    sd_m = math.sqrt(0.5 * (estimate.xx_m2 + estimate.yy_m2))
+    return LastPlace(estimate.x_m, estimate.y_m, sd_m, estimate.level, air)

@@ -44,8 +44,7 @@ from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon
 from echostep.settings import Settings
 from echostep.tracker import kernels
 from echostep.tracker.before_check_in import BeforeCheckIn
-from echostep.tracker.last_place import LastPlace, last_place
-from echostep.tracker.state import ParticleSnapshot, StreamState, TrackerState
+from echostep.tracker.state import LastPlace, ParticleSnapshot, StreamState, TrackerState, last_place
 from echostep.walls.level_sheet import lay_out_levels
 
 MAX_READINGS = 4096  # of beacons, waiting for their segment; beyond it the oldest are dropped, assumed

@@ -12,9 +12,8 @@ CMT: the constants of Xsens' public C++ SDK (cmtdef.h), for fields that both doc
 
 from echostep.xsens.frames import MTDATA, MTDATA2, Frame, FrameReader, encode_frame
 from echostep.xsens.message import MtMessage
-from echostep.xsens.mtdata import PROJECT, OutputFormat, pack_mtdata
+from echostep.xsens.mtdata import PROJECT, MtSample, OutputFormat, pack_mtdata
 from echostep.xsens.reader import MtBatch, MtxCounts, MtxLimits, MtxReader
-from echostep.xsens.sample import MtSample
 
 __all__ = [
     "MTDATA", "MTDATA2", "PROJECT", "Frame", "FrameReader", "MtBatch", "MtMessage", "MtSample", "MtxCounts", "MtxLimits", "MtxReader",

@@ -15,10 +15,9 @@ import numpy as np
 
 from echostep.xsens.axes import ENU, NED, NWU, from_values
 from echostep.xsens.frames import BUS_ID, CONFIGURATION, LONGEST, MTDATA, MTDATA2, Frame, FrameReader, MtFrameCounts
-from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, decode_mtdata, rest_of
+from echostep.xsens.mtdata import ACCEL, ATTITUDE, CELSIUS, GYRO, MAG, Quaternion, Vector, decode_mtdata, rest_of
 from echostep.xsens.output_formats import OutputFormats, configured_devices
 from echostep.xsens.packets import Packet, read_packets
-from echostep.xsens.sample import Quaternion, Vector
 
 SHARED_GAP = 500  # counters; a longer step is called a jump, not lost messages; assumed
 WORLDS = {ENU: "east, north, up", NED: "north, east, down", NWU: "north, west, up"}

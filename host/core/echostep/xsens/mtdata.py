@@ -16,7 +16,6 @@ import numpy as np
 
 from echostep.arrays import Bools, Floats, Ints, Octets
 from echostep.xsens.axes import from_values
-from echostep.xsens.sample import MtSample
 
 # Output mode [Manual 5.3.3, SetOutputMode; status: CMT].
 TEMPERATURE, CALIBRATED, ORIENTATION, AUXILIARY, STATUS, RAW = 0x0001, 0x0002, 0x0004, 0x0008, 0x0800, 0x4000
@@ -38,6 +37,20 @@ RAW_BYTES = 20  # accel, gyro, mag and temperature as u16, not calibrated
 
 # Columns of decoded values, the same for both measurement messages; NaN for a quantity that was not sent.
 ACCEL, GYRO, MAG, ATTITUDE, CELSIUS, COLUMNS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13), 13, 14
+
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+class MtSample(NamedTuple):
+    """Counter (u16), accel m/s2, gyro rad/s, mag in units of the earth's field (sensor frame); quaternion w x y z (sensor -> MT world)."""
+
+    counter: int
+    accel: Vector
+    gyro: Vector
+    mag: Vector
+    quaternion: Quaternion
 
 
 class Decoded(NamedTuple):

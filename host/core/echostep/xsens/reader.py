@@ -28,9 +28,8 @@ from echostep.xsens.frames import (
     encode_frame,
 )
 from echostep.xsens.gates import Messages, apply_gates, joined
-from echostep.xsens.mtdata import Decoded, OutputFormat, decode_mtdata, pack_mtdata
+from echostep.xsens.mtdata import Decoded, MtSample, OutputFormat, decode_mtdata, pack_mtdata
 from echostep.xsens.mtdata2 import decode_mtdata2, find_packets
-from echostep.xsens.sample import MtSample
 
 HELD = 10  # equal samples in a row, which coarse digits may give at rest; assumed
 

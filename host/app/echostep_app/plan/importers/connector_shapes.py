@@ -41,11 +41,6 @@ def join_connectors(drawn_levels: Sequence[DrawnLevel], report: ImportReport) ->
     return tuple(_connector(chain, joining) for chain in joining)
 
 
-def _same_place(one: Polygon, other: Polygon) -> bool:
-    """Whether two areas on different levels lie above each other."""
-    return bool(one.intersection(other).area > SHARED * min(one.area, other.area))
-
-
 class _ConnectorChain:
     """One staircase or shaft, collected from the lowest level upwards."""
 
@@ -57,7 +52,8 @@ class _ConnectorChain:
         """Whether the shape is the same staircase one level higher, or the same lift any number of levels higher."""
         if shape.kind != self.kind or (self.kind != "lift" and level - self.levels[-1] > 1):
             return False
-        return _same_place(shape.area, self.area)
+        common = shape.area.intersection(self.area)
+        return bool(common.area > SHARED * min(shape.area.area, self.area.area))
 
     def add(self, shape: ConnectorShape, level: int) -> None:
         """Extend the chain to a level by its shape there."""

@@ -120,11 +120,6 @@ def _treads(corners: Floats, along: Floats) -> Floats:
     return np.concatenate((corners[0] + shares * along, corners[3] + shares * along), axis=1)
 
 
-def _cross(corners: Floats, _: Floats) -> Floats:
-    """Both diagonals, the symbol of a lift."""
-    return np.concatenate((corners[:2], corners[2:]), axis=1)
-
-
 def _double_arrow(corners: Floats, along: Floats) -> Floats:
     """A line along the middle with a head at both ends: which end is up is not in the plan."""
     across = corners[3] - corners[0]
@@ -139,6 +134,6 @@ def _double_arrow(corners: Floats, along: Floats) -> Floats:
 
 PATTERNS: dict[ConnectorKind, Callable[[Floats, Floats], Floats]] = {
     "stairs": _treads,
-    "lift": _cross,
+    "lift": lambda corners, _: np.concatenate((corners[:2], corners[2:]), axis=1),  # both diagonals
     "ramp": _double_arrow,
 }

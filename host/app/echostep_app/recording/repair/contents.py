@@ -146,9 +146,9 @@ def _head(recovery: Recovery, contents: Contents) -> list[str]:
     lines = [f"{recovery.path}: {recovery.size / 1e6:.1f} MB, {contents.seconds:.1f} s"]
     for key, value in recovery.metadata.items():
         if value:
-            lines.append(
-                f"  {key}: {value if len(value) < LONGEST_VALUE and chr(10) not in value else _indented(value)}"
-            )
+            is_short = len(value) < LONGEST_VALUE and chr(10) not in value
+            shown = value if is_short else "".join(f"\n    {line}" for line in value.splitlines())
+            lines.append(f"  {key}: {shown}")
     return [*lines, *_time_line(recovery.metadata)]
 
 
@@ -161,10 +161,6 @@ def _time_line(metadata: Mapping[str, str]) -> list[str]:
     return [
         "  times: of a clock that begins with the computer; echostep export FILE --plan PLAN -o NEW.mcap writes UTC"
     ]
-
-
-def _indented(text: str) -> str:
-    return "".join(f"\n    {line}" for line in text.splitlines())
 
 
 def _port_lines(contents: Contents) -> list[str]:
