@@ -8,6 +8,8 @@ commands print and write the same lines and files as the whole command line.
 from __future__ import annotations
 
 import argparse
+import atexit
+import gc
 import json
 import os
 import sys
@@ -23,6 +25,9 @@ WHOLE = "pages, teams, live runs, plans of other formats and the other commands:
 
 def main() -> None:
     """Entry point."""
+    # New objects. All that is imported stays: to look for garbage in it after each 700 took a tenth of a replay, to take it apart at the end a fifth.
+    gc.set_threshold(50_000)
+    atexit.register(gc.freeze)
     if whole := added("commands"):
         whole()
         return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Mode of the files of a run: readable by its user alone, unless `--share` was given.
+"""Files of a run: readable by its user alone, unless `--share` was given; whether one is being written.
 
-In: a path that is about to be written; a table. Out: a file of mode 0600 there. Owns the answer to `--share`.
+In: a path; a table. Out: a file of mode 0600 there; whether a process has locked it, as the recorder does. Owns the answer to `--share`.
 
 A recording shows where a person was, second by second. The process's umask stays as it is: compiled kernels, which other users of an installation
 read, are written meanwhile.
@@ -15,6 +15,12 @@ from collections.abc import Iterable, Sequence
 from itertools import chain, count
 from pathlib import Path
 
+try:
+    import fcntl
+except ImportError:  # Windows: there an open file cannot be removed
+    fcntl = None  # type: ignore[assignment]
+
+SUFFIX = ".mcap"  # of a recording
 PRIVATE, SHARED = 0o600, 0o666  # of a new file; the umask may take away more
 _share: list[bool] = []  # not empty: `--share`
 
@@ -48,3 +54,17 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object
     """Write the names of the columns, then the rows, into a file that is claimed. Raises OSError."""
     with claim(path).open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows(chain([columns], rows))
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a process has locked the file."""
+    if fcntl is None:
+        return False
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:  # a file system without locks
+            return False
+    return False

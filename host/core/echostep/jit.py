@@ -28,6 +28,8 @@ import numba
 from numba import config, njit, types
 from numba.core import event
 from numba.core.caching import IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import models, register_model, typeof_impl
 from numba.np import linalg
 
@@ -37,8 +39,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 # A division by zero is inf or NaN, as in numpy. The wrapper left out is the one by which C would call a kernel.
 _KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-# The kernel that calls it is cached with it
-_PART: dict[str, Any] = {**_KERNEL, "no_cpython_wrapper": True, "cache": False}
 _LEAN, _COUNTED, _INLINE = {"_nrt": False}, {"_nrt": True}, {"forceinline": True}
 DIGEST = 4  # bytes of the check sum, behind the pickle
 ASIDE = ".damaged"
@@ -96,6 +96,30 @@ class _Part:
         raise TypeError(f"{self.py_func.__qualname__} is a part of kernels: Python cannot call it")
 
 
+class _PartLibrary(JITCodeLibrary):
+    """The code of a part, for its callers to take: alone it is neither optimised nor made machine code, which is a fifth of the work of compiling.
+
+    numba gives the machine code of each function an environment, through `codegen`: this stands for it and does nothing.
+    """
+
+    codegen = property(lambda self: self)
+
+    def _nothing(self, *_: object) -> None: ...
+
+    set_env = _optimize_final_module = _nothing
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
+class _PartCompiler(Compiler):
+    def define_pipelines(self) -> Any:
+        """The steps of numba's compiler, with such a library."""
+        name, codegen = self.state.func_id.func_qualname, self.state.targetctx.codegen()
+        self.state.library = _PartLibrary(codegen, name)  # type: ignore[no-untyped-call]
+        return super().define_pipelines()  # type: ignore[no-untyped-call]
+
+
 class _PartType(types.Dispatcher):
     """The type of a part: a constant among its arguments is a number like any other."""
 
@@ -111,6 +135,10 @@ register_model(_PartType)(models.OpaqueModel)
 @typeof_impl.register(_Part)
 def _type_of_part(value: _Part, _context: object) -> _PartType:
     return _PartType(value.dispatcher)
+
+
+# The kernel that calls it is cached with it
+_PART: dict[str, Any] = {**_KERNEL, "no_cpython_wrapper": True, "cache": False, "pipeline_class": _PartCompiler}
 
 
 def _part(function: Function, options: dict[str, Any]) -> Function:

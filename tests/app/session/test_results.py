@@ -64,11 +64,22 @@ def test_a_table_that_cannot_be_written_is_an_error_of_a_run_without_estimates_t
         results.write_results(tmp_path, TRACKER, None, results.Result("walk", []))
 
 
+LISTED = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); from echostep.cli import main; main()"
+
+
 @pytest.mark.process
-def test_a_replay_without_a_page_loads_no_server() -> None:
-    code = "import sys, echostep_app.session.runs.replay; print({'uvicorn', 'starlette', 'pydantic', 'matplotlib'} & sys.modules.keys())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE_S, check=True)
-    assert done.stdout == "set()\n"
+@pytest.mark.parametrize(
+    ("command", "unused"),
+    [
+        ("--help", "numpy numba rich pydantic scipy"),
+        ("doctor", "matplotlib shapely mcap msgspec uvicorn scipy.linalg"),
+        (f"replay {ROOT}/tests/captures/walk.mcap --headless --out .", "scipy.linalg echostep_app.page echostep_app.team echostep_app.mapping"),
+    ],
+)  # fmt: skip
+def test_a_command_loads_nothing_that_it_does_not_use(command: str, unused: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", LISTED, *command.split()]
+    told = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE_S, check=False).stderr
+    assert {"echostep_app.cli", *unused.split()} & set(told.splitlines()[-1].split()) == {"echostep_app.cli"}
 
 
 def alive() -> set[int]:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import csv
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import pytest
 
 import echostep
 from echostep.errors import EchostepError
+from echostep.localization import digest
 from echostep.plan import NO_PLAN, Pose, load_plan
 from echostep.walk.table import write_track
 from walks import DEMO, WALK, foot_track
@@ -23,6 +26,18 @@ pytestmark = pytest.mark.slow
 def walk() -> echostep.Walk:
     """The recorded walk on its plan."""
     return echostep.replay(WALK, DEMO)
+
+
+DIGEST = "import sys, echostep; from echostep.localization import digest; print(digest(echostep.replay(*sys.argv[1:]).estimates))"
+
+
+@pytest.mark.process
+@pytest.mark.long
+def test_a_walk_has_the_same_bytes_by_kernels_without_wide_vectors(walk: echostep.Walk, tmp_path: Path) -> None:
+    """Of numpy the same is not asked: its exp and log differ by the processor in the last bit."""
+    least = {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path)}
+    told = subprocess.check_output([sys.executable, "-c", DIGEST, WALK, DEMO], env=os.environ | least, text=True)
+    assert told.strip() == digest(walk.estimates)
 
 
 def test_a_table_holds_what_track_csv_does(walk: echostep.Walk, tmp_path: Path) -> None:

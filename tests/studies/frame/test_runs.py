@@ -213,8 +213,3 @@ def test_without_the_distribution_a_command_says_how_to_get_it(monkeypatch: pyte
     assert "pip install echostep-studies" in alone.output
     assert isinstance(asked.exception, EchostepError)
     assert "pip install echostep-studies" in str(asked.exception)
-
-
-def test_without_a_command_run_nothing_heavy_is_imported() -> None:
-    code = "import sys, echostep_studies.commands; print([m for m in ('numpy', 'rich.table', 'scipy') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

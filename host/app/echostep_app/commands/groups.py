@@ -156,9 +156,11 @@ class Output:
         return None if self.headless else page_address(self.page, self.host, self.port, self.lang)
 
     def _outlet(self) -> Outlet | None:
+        if not self.publish:
+            return None
         from echostep_app.team.endpoint import parse_outlet
 
-        return parse_outlet(self.publish, self.name, self.team) if self.publish else None
+        return parse_outlet(self.publish, self.name, self.team)
 
     def _foxglove_address(self) -> FoxgloveAddress | None:
         if self.foxglove is None:

@@ -42,7 +42,8 @@ class CrewLog:
     def _add(self, unix_s: float, *cells: str) -> None:
         if len(self.events) < MOST_LINES:
             time = datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="seconds")
-            self.events.append((time, *map(_plain, cells)))
+            plain = (f"'{cell}" if cell.startswith(FORMULAS) else cell for cell in cells)  # for table programs
+            self.events.append((time, *plain))
 
     def write(self, path: Path) -> None:
         """Write the table, in order of time; raises EchostepError when the file cannot be written."""
@@ -61,8 +62,3 @@ def _event(before: Crew | None, after: Crew) -> str:
     if before is not None and after.checked_s != before.checked_s:
         return "checked"
     return "changed"
-
-
-def _plain(text: str) -> str:
-    """A cell that no table program takes for a formula."""
-    return f"'{text}" if text.startswith(FORMULAS) else text

@@ -22,6 +22,16 @@ SALT = "echostep"  # of the names of an SVG's elements, which are random without
 WITHOUT_DATE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}  # equal pictures are equal files
 
 
+def load_matplotlib() -> None:
+    """Import matplotlib for a command: without the tables of properties in its documentation, which take a third of the time."""
+    from matplotlib import artist as artists
+
+    documented, artists.kwdoc = artists.kwdoc, lambda artist: ""  # noqa: ARG005
+    import matplotlib.figure  # noqa: F401
+
+    artists.kwdoc = documented
+
+
 def check_picture(path: Path) -> Path:
     """The same path; raises EchostepError when no picture can be drawn into a file of this name."""
     if path.suffix.casefold() not in ENDINGS:

@@ -21,6 +21,7 @@ from echostep_app.output.track_plot import draw_track
 from echostep_app.plan.places.whereabouts import Whereabouts
 from echostep_app.printing.console import console
 from echostep_app.printing.lines import as_error
+from echostep_app.printing.picture_files import load_matplotlib
 from echostep_app.scorecard.card import Scorecard
 from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.scorecard.truth import card_of
@@ -91,6 +92,7 @@ def _draw(
     folder: Path, tracker: Tracker, guided: CueList | None, result: Result, card: Scorecard | None
 ) -> EchostepError | None:
     """Draw track.png; an error is returned."""
+    load_matplotlib()
     title = f"{result.title}: mean error {card.horizontal.mean_m:.2f} m" if card else result.title
     route = guided.route if guided else None
     beacons = tracker.beacon_places(result.estimates[-1].t_s) if result.estimates else []

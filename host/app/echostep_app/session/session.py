@@ -29,14 +29,11 @@ from echostep_app.guidance.guided_run import guidance_of
 from echostep_app.interruption import holding_signals, is_asked
 from echostep_app.kernel_parts import LATER, PREPARING, TRACKING, Part, compile_parts, compiling_later
 from echostep_app.output.terminal import TerminalView
-from echostep_app.page.elements.scene import TruePath
-from echostep_app.page.mailbox import popped
 from echostep_app.plan.places.findings import refusals
 from echostep_app.plan.routing import EXIT
 from echostep_app.printing.console import console, print_notices
 from echostep_app.printing.people import FaultNews, outlast_output
 from echostep_app.printing.progress import progress_line
-from echostep_app.recording.recorder import DerivedMessage, Recorder
 from echostep_app.scorecard.track_columns import ScoredPath
 from echostep_app.session.chunk_streams import MessageSource
 from echostep_app.session.losses import Arrivals, Losses
@@ -54,6 +51,7 @@ from echostep_app.session.sinks import (
 
 if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
+    from echostep_app.recording.recorder import DerivedMessage, Recorder
     from echostep_app.session.team.subscription import TeamSubscription
     from echostep_app.team.endpoint import Endpoint, Outlet
     from echostep_app.team.publish import Publishing, Source
@@ -157,6 +155,8 @@ class Session:
         """Show the true position and the estimate, on the page, and compare with it at the end."""
         self._truth = truth
         if self.page:
+            from echostep_app.page.elements.scene import TruePath
+
             self.page.truth = TruePath.of(truth, self.tracker.plan)
 
     def _open_publishing(self, opened: ExitStack) -> None:
@@ -199,6 +199,7 @@ class Session:
 
     def _read_team(self, subscription: TeamSubscription, outlet: Outlet, run: str) -> None:
         """Read teammates and beacons, and for a page the commanders' marks."""
+        from echostep_app.page.mailbox import popped
         from echostep_app.session.team.feeds import MarkFeed
         from echostep_app.session.team.teammate_feed import TeammateFeed
 

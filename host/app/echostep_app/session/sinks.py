@@ -16,14 +16,12 @@ from echostep.ports.chunks import Portion
 from echostep.tracker import Tracker
 from echostep_app.guidance.cue_list import CueList
 from echostep_app.guidance.cues import arrow_sign, describe_cue
-from echostep_app.output.derived import Derived
 from echostep_app.output.terminal import TerminalView
-from echostep_app.page.mailbox import popped
 from echostep_app.printing.console import console, print_notices
-from echostep_app.recording.recorder import DerivedMessage
 
 if TYPE_CHECKING:
     from echostep_app.page.live import LivePage
+    from echostep_app.recording.recorder import DerivedMessage
     from echostep_app.session.team.feeds import MarkFeed
     from echostep_app.session.team.teammate_feed import TeammateFeed
 
@@ -72,6 +70,7 @@ def teammate_sink(teammates: TeammateFeed, tracker: Tracker, page: LivePage | No
 
 def mark_sink(marks: MarkFeed, page: LivePage) -> Sink:
     """For the page: the commanders' marks and orders, and the way to a wearer in distress; from it: understood orders."""
+    from echostep_app.page.mailbox import popped
 
     def take(_: Portion, __: list[Estimate]) -> None:
         if (news := marks.news()) is not None:
@@ -89,6 +88,8 @@ def derived_sink(
     tracker: Tracker, writers: Sequence[Callable[[list[DerivedMessage]], None]], log_offset_ns: int = 0
 ) -> Sink:
     """Messages that are derived from estimates, for the recording and for viewers."""
+    from echostep_app.output.derived import Derived
+
     derived = Derived(tracker, log_offset_ns)
 
     def take(portion: Portion, estimates: list[Estimate]) -> None:

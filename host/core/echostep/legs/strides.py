@@ -306,7 +306,9 @@ class StrideEstimator:
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         off = leg_swings.toe_off_index(rate, span - 1, 0)
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
-        stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
+        early = np.abs(rate[: max(off - STANCE * bout.cycle // 100, 0)])
+        calm = not len(early) or float(early.max()) < 0.4 * self.swings.threshold() / leg_swings.PEAK_SHARE  # no swing
+        stood = bout.stood or calm
         stance = 0 if stood else int(np.argmax(phase > 0.0))
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
         length = PELVIS * float(way.forward_m[off] - way.forward_m[stance]) + pace * stance / GRID_HZ
@@ -322,10 +324,6 @@ class StrideEstimator:
             [b.value for b in self.bias]
         )
         return len(rates) > 0 and float(np.abs(rates).max()) < leg_swings.MOVING_RAD_S
-
-    def _calm(self, rate: Floats) -> bool:
-        """Whether the shank's rates (n,) hold no swing, so that the foot stands."""
-        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.PEAK_SHARE
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
         """End the bout at this grid index, because the leg stands or because the samples end."""

@@ -125,7 +125,9 @@ class FrontEnd:
 
     def process(self, portion: Portion) -> list[MeasuredSegment | Dropout]:
         """Segments and dropouts that a portion completes; raises StaleFirmwareError when the board has another schema."""
-        self._count_unknown_ports(portion)
+        for k, port in enumerate(portion.ports):
+            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, LINES):
+                self._unknown_ports += int((portion.port == k).sum())
         # Decode: bytes of each port -> board frames, the foot's samples.
         from_board = portion.of(BOARD)
         frames, samples = self.board.frames(from_board.received), self._read_foot(portion)
@@ -173,11 +175,6 @@ class FrontEnd:
             self.timeline.expect_foot_board()
             self.foot = Foot(self._foot_settings, ICM20649_NOISE)
         return samples
-
-    def _count_unknown_ports(self, portion: Portion) -> None:
-        for k, port in enumerate(portion.ports):
-            if port not in (BOARD, MTX, FOOT, GATEWAY, PERSON, TEAM, MEETING, TEAM_BEACONS, LINES):
-                self._unknown_ports += int((portion.port == k).sum())
 
     def _advance_clock(self, times: Times) -> None:
         """Keep the newest time of either port."""

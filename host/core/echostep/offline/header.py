@@ -41,7 +41,9 @@ class Header:
         scaled: Floats = rows.values * [self.factors.get(name, 1.0) for name in names]
         if self.counts_hz is not None:
             time = list(names).index("t_s")
-            scaled[:, time] = since_first(rows.values[:, time], self.counts_period) / self.counts_hz
+            whole = np.isfinite(rows.values[:, time])
+            counts = np.unwrap(rows.values[whole, time], period=self.counts_period)
+            scaled[whole, time] = (counts - counts[:1]) / self.counts_hz
         return CsvTable(scaled, rows.line)
 
 
@@ -52,12 +54,3 @@ def own_header(lines: Iterator[str]) -> Header:
     """The names in the first line, as they are, in SI units."""
     names, separator = header_of(next(lines, ""))
     return Header(names, separator, 1)
-
-
-def since_first(counter: Floats, period: int) -> Floats:
-    """Counts since the first one, of a counter (n,) that wraps after `period`; NaN where there is no number."""
-    counts = np.full(len(counter), np.nan)
-    whole = np.isfinite(counter)
-    unwrapped = np.unwrap(counter[whole], period=period)
-    counts[whole] = unwrapped - unwrapped[:1]
-    return counts

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from echostep.additions import face
 
 if TYPE_CHECKING:
-    from echostep.recording.being_written import SUFFIX, is_being_written
+    from echostep.file_mode import SUFFIX, is_being_written
     from echostep.recording.capture import Decoder, as_json, port_of_bytes, read_capture
     from echostep.recording.clock import clock_of, log_offset_ns, utc_offset_ns, with_log_time
     from echostep.recording.joining import open_parts

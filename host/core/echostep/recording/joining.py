@@ -12,8 +12,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from echostep.errors import EchostepError
+from echostep.file_mode import SUFFIX
 from echostep.ports.chunks import Portion
-from echostep.recording.being_written import SUFFIX
 from echostep.recording.mcap_records import PART, RUN
 from echostep.recording.reading import Recording, open_recording
 

@@ -19,8 +19,8 @@ from mcap.records import Header, Metadata
 
 from echostep.arrays import Octets
 from echostep.errors import EchostepError, replaced
+from echostep.file_mode import is_being_written
 from echostep.ports.chunks import Chunk, Portion
-from echostep.recording.being_written import is_being_written
 from echostep.recording.clock import log_offset_ns
 from echostep.recording.damage.ending import Ending, begins_as_mcap, checksum_matches, read_ending
 from echostep.recording.damage.notes import FileDamage, made_of

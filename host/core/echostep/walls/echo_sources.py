@@ -106,21 +106,21 @@ def _walls_near(tile: int, index: WallIndex) -> Int32s:
     reach = math.ceil((EAR_REACH_M + JOIN_M) / TILE_M)
     column, row = tile % index.columns, tile // index.columns
     left, right = max(column - reach, 0), min(column + reach + 1, index.columns)
-    numbers = np.empty(64, np.int32)
-    count = 0
+    numbers, count = np.empty(64, np.int32), 0
     for r in range(max(row - reach, 0), min(row + reach + 1, index.rows)):
         for k in range(index.start[r * index.columns + left], index.start[r * index.columns + right]):
             if count == len(numbers):
                 numbers = np.concatenate((numbers, numbers))
-            numbers[count] = index.ids[k]
+            slot = count
+            while slot > 0 and numbers[slot - 1] > index.ids[k]:
+                slot -= 1
+            if slot > 0 and numbers[slot - 1] == index.ids[k]:
+                continue
+            for later in range(count, slot, -1):
+                numbers[later] = numbers[later - 1]
+            numbers[slot] = index.ids[k]
             count += 1
-    numbers = np.sort(numbers[:count])
-    unique = 0
-    for k in range(count):
-        if unique == 0 or numbers[k] != numbers[unique - 1]:
-            numbers[unique] = numbers[k]
-            unique += 1
-    return numbers[:unique]
+    return numbers[:count]
 
 
 @part

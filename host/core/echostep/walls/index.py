@@ -220,8 +220,10 @@ def crossings(from_x: Floats, from_y: Floats, to_x: Floats, to_y: Floats, index:
 @part
 def _cross_in_box(ax: Floats, ay: Floats, bx: Floats, by: Floats, index: WallIndex, crosses: Bools) -> bool:
     """Mark the moves (n,) from a to b that cross a wall in the box around them; False if the box has many tiles, or is not finite."""
-    left, right = min(ax.min(), bx.min()), max(ax.max(), bx.max())
-    low, high = min(ay.min(), by.min()), max(ay.max(), by.max())
+    left, right, low, high = ax[0], ax[0], ay[0], ay[0]
+    for i in range(len(ax)):
+        left, right = min(left, ax[i], bx[i]), max(right, ax[i], bx[i])
+        low, high = min(low, ay[i], by[i]), max(high, ay[i], by[i])
     if not (right - left) * (high - low) < MOST_TILES * TILE_M * TILE_M:
         return False
     first, beyond = _tiles(left - index.x0_m, right - index.x0_m, index.columns)

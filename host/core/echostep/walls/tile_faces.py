@@ -40,9 +40,8 @@ class Strip(NamedTuple):
 
 @part
 def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> SourceTable:
-    """The walls of `near` that can answer a tile, unless other walls cover them, with their screens."""
-    faces, starts = np.empty((len(near), FACE)), np.zeros(len(near) + 1, np.int32)
-    centre, spread, distance = np.empty(len(near)), np.empty(len(near)), np.empty(len(near))
+    """The walls of `near` that can answer a tile, unless other walls cover them, with their screens; rows have three more columns here."""
+    faces, starts = np.empty((len(near), FACE + 3)), np.zeros(len(near) + 1, np.int32)
     screens, used, count = np.empty(256, np.int32), 0, 0
     spans = np.empty((len(near), 4))
     for w in near:
@@ -62,14 +61,14 @@ def tile_faces(corners: Floats, near: Int32s, walls: Floats, slant: float) -> So
             continue
         used += more
         faces[count, 0], faces[count, 1], faces[count, 2], faces[count, 3], faces[count, 4] = x, y, tx, ty, length
-        distance[count] = nearest
-        centre[count] = math.atan2(-tx, ty) if low > 0.0 else math.atan2(tx, -ty)
-        spread[count] = math.atan(slant) if nearest > 0.0 else math.pi
+        faces[count, FACE] = nearest
+        faces[count, FACE + 1] = math.atan2(-tx, ty) if low > 0.0 else math.atan2(tx, -ty)
+        faces[count, FACE + 2] = math.atan(slant) if nearest > 0.0 else math.pi
         count += 1
         starts[count] = used
-    bearings, order = by_bearing(centre[:count], spread[:count], distance)
-    total = np.array([0, count], np.int32)
-    return SourceTable(total, bearings, order, faces[:count].copy(), starts[: count + 1].copy(), screens[:used].copy())
+    bearings, order = by_bearing(faces[:count], FACE)
+    rows, total = faces[:count, :FACE].copy(), np.array([0, count], np.int32)
+    return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 
 
 @lean_part

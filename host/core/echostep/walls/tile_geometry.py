@@ -42,17 +42,20 @@ def covered(spans: Floats, low: float, high: float, overlap: float) -> bool:
 
 
 @part
-def by_bearing(centre: Floats, spread: Floats, distance: Floats) -> tuple[Int32s, Int32s]:
-    """For each bearing of an axis, the rows that may be within CONE_RAD of it, nearest first, as starts and row numbers."""
-    start, order, count = np.zeros(BEARINGS + 1, np.int32), np.empty(BEARINGS * len(centre), np.int32), 0
+def by_bearing(rows: Floats, at: int) -> tuple[Int32s, Int32s]:
+    """For each bearing of an axis, the rows that may be within CONE_RAD of it, nearest first, as starts and row numbers.
+
+    Their columns from `at` on: distance, bearing from the tile, the greatest deviation from it.
+    """
+    start, order, count = np.zeros(BEARINGS + 1, np.int32), np.empty(BEARINGS * len(rows), np.int32), 0
     width = 2.0 * math.pi / BEARINGS
     for b in range(BEARINGS):
-        for i in range(len(centre)):
-            off = (b + 0.5) * width - centre[i]
+        for i in range(len(rows)):
+            off = (b + 0.5) * width - rows[i, at + 1]
             off = abs(off - 2.0 * math.pi * math.floor(off / (2.0 * math.pi) + 0.5))
-            if off <= CONE_RAD + 0.5 * width + spread[i] + SLACK_M:
+            if off <= CONE_RAD + 0.5 * width + rows[i, at + 2] + SLACK_M:
                 slot = count
-                while slot > start[b] and distance[order[slot - 1]] > distance[i]:
+                while slot > start[b] and rows[order[slot - 1], at] > rows[i, at]:
                     order[slot] = order[slot - 1]
                     slot -= 1
                 order[slot] = i

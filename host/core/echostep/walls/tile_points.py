@@ -73,7 +73,7 @@ def tile_points(corners: Floats, near: Int32s, index: WallIndex) -> SourceTable:
                 used += more
                 count += 1
                 starts[count] = used
-    bearings, order = by_bearing(points[:count, POINT], points[:count, POINT + 1], points[:count, POINT - 1])
+    bearings, order = by_bearing(points[:count], POINT - 1)
     rows, total = points[:count, :POINT].copy(), np.array([0, count], np.int32)
     return SourceTable(total, bearings, order, rows, starts[: count + 1].copy(), screens[:used].copy())
 

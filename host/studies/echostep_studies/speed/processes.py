@@ -7,8 +7,6 @@ In: a `Scale`. Out: `Row`s against what is allowed. Owns nothing.
 from __future__ import annotations
 
 import csv
-import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -17,6 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from statistics import median
 
+from echostep_studies.speed.against import cost
 from echostep_studies.speed.comparison import Row, Scale
 
 FIRST_FIX = """
@@ -44,8 +43,8 @@ def starting(scale: Scale) -> Iterator[Row]:
     helped, bare, fixed = [], [], []
     subprocess.run([python, "-c", FIRST_FIX], check=True, capture_output=True, timeout=300)  # fills numba's cache
     for _ in range(scale.rounds):
-        helped.append(_cpu_s([python, "-m", "echostep", "--help"]))
-        bare.append(_cpu_s([python, "-c", "pass"]))
+        helped.append(cost([python, "-m", "echostep", "--help"], {"COLUMNS": "80"})[0])
+        bare.append(cost([python, "-c", "pass"], {})[0])
         done = subprocess.run([python, "-c", FIRST_FIX], check=True, capture_output=True, text=True, timeout=300)
         fixed.append(float(done.stdout))
     more_s = median(helped) - median(bare)
@@ -102,11 +101,3 @@ def replaying(scale: Scale) -> Iterator[Row]:
     )
     whole_s = median(one["_write_tables"][1] for one in took)
     yield Row("replay of the demo to track.csv, CPU; 1.2 s allowed", 1.2 / whole_s, whole_s, 1.2, 1.0)
-
-
-def _cpu_s(command: list[str]) -> float:
-    """User and system time of a command."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=60, env={**os.environ, "COLUMNS": "80"})
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -53,9 +53,8 @@ def _tags(feature: dict[str, Any], where: str) -> dict[str, str]:
         except (ValueError, RecursionError) as error:
             raise ValueError(f"{where}.properties.tags: not JSON: {error}") from error
     tags = typed(tags, f"{where}.properties.tags", dict)
-    return {str(key): _text(value) for key, value in tags.items() if not str(key).startswith("@") and value is not None}
-
-
-def _text(value: Any) -> str:
-    """A tag's value; of a list, as of levels, its values as OpenStreetMap separates them."""
-    return ";".join(map(str, value)) if isinstance(value, list) else str(value)
+    return {  # a list, as of levels, as OpenStreetMap separates its values
+        str(key): ";".join(map(str, value)) if isinstance(value, list) else str(value)
+        for key, value in tags.items()
+        if not str(key).startswith("@") and value is not None
+    }
