@@ -119,17 +119,12 @@ def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is
 
 
 def test_clouds_are_compared_by_all_of_their_evidence_and_with_elsewhere_by_a_part_of_it() -> None:
-    belief = Belief(no_cloud(), 0.9, PLAN_FITS)
-    belief.begin_search(no_search(), 0.0)
-    belief.find([(no_cloud(), 0.5)])
-    before = [each.log_weight for each in belief.clouds]
-    odds = before[0] - before[1]
+    belief = Belief(no_cloud(), 0.5, PLAN_FITS)
+    belief.clouds.append(Hypothesis(no_cloud(), math.log(0.4)))
     belief.weigh_clouds([(2.0, 0.0), (1.0, 0.0)])
-    first, second = (each.log_weight for each in belief.clouds)
-    assert first - second == pytest.approx(odds + 1.0)
-    here, both = (sum(map(math.exp, logs)) for logs in (before, (first, second)))
-    mean = (math.exp(before[0] + 2.0) + math.exp(before[1] + 1.0)) / here
-    assert both == pytest.approx(here * mean**TEMPER)
+    first, second = (math.exp(each.log_weight) for each in belief.clouds)
+    assert first / second == pytest.approx(0.5 / 0.4 * math.e)
+    assert first + second == pytest.approx(0.9 * ((0.5 * math.exp(2.0) + 0.4 * math.e) / 0.9) ** TEMPER)
 
 
 def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be_tracked() -> None:

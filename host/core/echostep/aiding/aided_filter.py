@@ -95,12 +95,11 @@ class AidedFilter(MapFilter):
         return self._met.refusal(meeting)
 
     def _track_from(self, meeting: Meeting, right: float, fits: list[float]) -> None:
-        """Track the hypothesis that fits a meeting best from now on, if one does, otherwise a new cloud about the teammate, with any heading."""
+        """Believe the hypothesis that fits a meeting best, if one does, otherwise a new cloud about the teammate, with any heading."""
         belief, best = self.belief, int(np.argmax(fits))
         if fits[best] < PROBABLE:
             at, best = start_at(meeting), len(belief.clouds)
             start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
             belief.clouds.append(Hypothesis(self.new_cloud(self.building.drawn.widened(start), 0.0), -math.inf))
-        each = belief.hypotheses[best]
-        belief.raise_to(each, right)
-        belief.track(each)
+        belief.raise_to(belief.hypotheses[best], right)
+        belief.prune()

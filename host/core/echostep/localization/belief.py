@@ -227,13 +227,6 @@ class Belief:
             if each.log_weight < math.log(LEAST) and len(self.hypotheses) > 1:
                 self.end(each)
 
-    def track(self, each: AnyHypothesis) -> None:
-        """Track another hypothesis; a search is tracked where there is no cloud."""
-        if each is self.search:
-            for cloud in self.clouds:
-                self.end(cloud)
-        self.clouds.sort(key=lambda cloud: cloud is not each)
-
     def end(self, each: AnyHypothesis) -> None:
         """End a hypothesis: the trunk is elsewhere."""
         self._move(each, 1.0)
