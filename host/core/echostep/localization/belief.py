@@ -95,10 +95,7 @@ class Belief:
     """
 
     def __init__(self, cloud: Cloud | None, prior: float, plan_fits: float) -> None:
-        """Prior probabilities: that the trunk is in the first cloud, if it is in this building; that the plan is the building's.
-
-        Without a cloud a search has to begin.
-        """
+        """Prior probabilities: that the trunk is in the cloud, without which a search has to begin; that the plan is the building's."""
         self.clouds = [] if cloud is None else [Hypothesis(cloud, _log(prior))]
         self.search: Hypothesis[Search] | None = None
         self.searches_begun = 0
@@ -209,8 +206,8 @@ class Belief:
         self.judge_plan()
 
     def find(self, found: Sequence[tuple[Cloud, float]]) -> None:
-        """The search is over: it has found clouds, each with its share of the search. The rest stays elsewhere."""
-        if self.search is not None:
+        """The search is over if it has found clouds, each with its share of the search. The rest stays elsewhere."""
+        if self.search is not None and found:
             self.clouds += [Hypothesis(cloud, self.search.log_weight + _log(share)) for cloud, share in found]
             self.search.log_weight += _log(1.0 - sum(share for _, share in found))
             self.end(self.search)

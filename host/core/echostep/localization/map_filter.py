@@ -235,10 +235,8 @@ class MapFilter:
 
     def _find(self) -> None:
         """Track the places that a search has found."""
-        search = self.belief.search
-        found = [] if search is None else self._way.births(search.cloud, self._blurred, self.building.walls)
-        if found:
-            self.belief.find(found)
+        if self.belief.search is not None:
+            self.belief.find(self._way.births(self.belief.search.cloud, self._blurred, self.building.walls))
 
     def _trace(
         self, each: Hypothesis[Cloud], move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
