@@ -47,7 +47,7 @@ def event(report: Report) -> bytes | None:
     detail = ElementTree.SubElement(top, "detail")
     ElementTree.SubElement(detail, "contact", callsign=report.name)
     if motion is not None and place.course_deg is not None:
-        track = {"course": f"{place.course_deg:.1f}", "speed": f"{motion.speed_m_s:.2f}"}
+        track = {"course": f"{round(place.course_deg, 1) % 360.0:.1f}", "speed": f"{motion.speed_m_s:.2f}"}
         ElementTree.SubElement(detail, "track", track)
     if report.battery_percent is not None:
         ElementTree.SubElement(detail, "status", battery=str(report.battery_percent))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echostep.arrays import Bools, Floats
-from echostep.ports.chunks import MTX, Chunk
+from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.xsens import MTDATA, encode_frame
 from echostep_simulation.scenario import START_NS
 from echostep_studies.bench.echo_changes import LEFT, RIGHT
@@ -84,11 +84,16 @@ def repeating(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
     return changed
 
 
-def loose_plug(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
-    """Every 12 s from the begin of the span on the MTx's bytes are missing, for 1 to 5 s in turn."""
-    since_s = [divmod(_since_s(chunk, span_s), 12.0) for chunk in chunks]
+def loose_plug(chunks: Sequence[Chunk], span_s: Span, port: str = MTX, later_s: float = 0.0) -> list[Chunk]:
+    """Every 12 s, from this long after the begin of the span on, a port's bytes are missing, for 1 to 5 s in turn."""
+    since_s = [divmod(_since_s(chunk, span_s) - later_s, 12.0) for chunk in chunks]
     loose = [number >= 0.0 and at_s < 1.0 + number % 5.0 for number, at_s in since_s]
-    return [chunk for chunk, is_loose in zip(chunks, loose, strict=True) if chunk.port != MTX or not is_loose]
+    return [chunk for chunk, is_loose in zip(chunks, loose, strict=True) if chunk.port != port or not is_loose]
+
+
+def loose_plugs(chunks: Sequence[Chunk], span_s: Span) -> list[Chunk]:
+    """The plugs of MTx and board in turn: the board's six seconds after the MTx's."""
+    return loose_plug(loose_plug(chunks, span_s), span_s, BOARD, 6.0)
 
 
 def _since_s(chunk: Chunk, span_s: Span) -> float:

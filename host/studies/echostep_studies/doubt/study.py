@@ -74,6 +74,7 @@ KINDS = {
     "rangers/die": Kind(hears=faults.one_after_the_other),
     "rangers/covered": Kind(hears=faults.covered),
     "plug": Kind(arrives=faults.loose_plug),
+    "plug/both": Kind(arrives=faults.loose_plugs),
     "start/2m": Kind(start=lambda pose: replace(pose, x_m=pose.x_m + 2.0)),
     "start/90deg": Kind(start=lambda pose: replace(pose, heading_rad=pose.heading_rad + 0.5 * np.pi)),
     "plan/scaled": Kind(plan=lambda p: replace(p, levels=tuple(replace(at, walls=1.05 * at.walls) for at in p.levels))),

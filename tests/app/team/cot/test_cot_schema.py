@@ -96,6 +96,7 @@ def test_every_report_makes_a_valid_event(
     place = ReportedPlace(lat, lon, hae_m, sd_m, None if hae_m is None else 2.0, course)
     told = replace(report(), place=place, name=name, team=team, source=source)  # type: ignore[arg-type]
     assert faults(made(told)) == []
+    assert all(0.0 <= float(t.get("course", "")) < 360.0 for t in ElementTree.fromstring(made(told)).iter("track"))
 
 
 @pytest.mark.parametrize(("source", "meaning"), [("live", "fused"), ("replay", "relayed"), ("simulated", "simulated")])
