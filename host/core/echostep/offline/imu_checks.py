@@ -23,12 +23,8 @@ SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
-WRAPS_S = (
-    2**32 * 1e-6,
-    2**32 * 1e-4,
-    2**32 * 1e-3,
-    2**16 * 1e-3,
-)  # of counters in microseconds, tenths of a millisecond, milliseconds
+# Of counters in microseconds, tenths of a millisecond, milliseconds
+WRAPS_S = 2**32 * 1e-6, 2**32 * 1e-4, 2**32 * 1e-3, 2**16 * 1e-3
 ROOM = 1.5  # periods between two neighbours, between which there is a place
 LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 MISSING_SHARE = 0.02  # share of missing samples that is reported

@@ -22,10 +22,8 @@ from echostep.recording.mcap_records import HEAD_SIZE, MCAP_MAGIC, MESSAGE, MESS
 
 # [MCAP format specification]
 CHUNK, CHUNK_HEAD = 0x06, HEAD_SIZE + 40  # opcode; bytes before the records of a chunk that is not compressed
-LAST_OPCODE, PRIVATE = (
-    0x0F,
-    0x80,
-)  # of the specification; the first of other programs, and of the place that `open_chunk` keeps for a chunk's head
+# Of the specification; the first of other programs, and of the place that `open_chunk` keeps for a chunk's head
+LAST_OPCODE, PRIVATE = 0x0F, 0x80
 # Assumed.
 VALID_RUN = 4  # this many consecutive records are not valid by chance
 OTHER_LIMIT = 1 << 20  # bytes; only messages and chunk records are larger
