@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -147,7 +148,10 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     pytest.importorskip("hatchling")
     folder = tmp_path_factory.mktemp("core")
     programs = wheels.environment(folder / "fresh", [wheels.build(folder, "core")], borrow=True)
-    return programs, wheels.environment_variables(programs, folder) | {"HOME": str(Path.home())}
+    blas = {
+        name: value for name, value in os.environ.items() if name.startswith("OPENBLAS_")
+    }  # sums as here, bit for bit
+    return programs, wheels.environment_variables(programs, folder) | {"HOME": str(Path.home())} | blas
 
 
 @pytest.mark.long

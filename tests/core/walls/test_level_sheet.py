@@ -246,7 +246,7 @@ def test_a_walk_by_stairs_and_lift_is_followed() -> None:
     assert {e.level for e in estimates} == {0, 1, 2}
     assert error.mean() < 0.3
     assert np.abs(z - [e.z_m for e in estimates]).max() < 1.5
-    assert all(sum(e.levels) == pytest.approx(1.0) for e in estimates)
+    assert all(0.99 < sum(e.levels) < 1.0 + 1e-9 for e in estimates)  # the rest: a floor that the plan lacks
 
 
 @pytest.mark.long
