@@ -95,7 +95,8 @@ def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
     order = np.argsort(t_s, kind="stable")
     ahead, steps = (each[each > 0.0] for each in (np.diff(t_s), np.diff(t_s[order])))
     apart = back == 1 and len(steps) and t_s[0] - t_s[-1] > LATEST * np.median(steps)
-    if len(steps) and back < BACK_SHARE * len(t_s) and (apart or np.median(steps) < 0.75 * np.median(ahead)):
+    met = len(ahead) - len(steps) + back > BACK_SHARE * len(t_s)  # at equal times: both parts count from 0
+    if len(steps) and back < BACK_SHARE * len(t_s) and (apart or met or np.median(steps) < 0.75 * np.median(ahead)):
         raise ValueError("t_s begins anew within the file: are these several recordings? Cut it there")
     if len(steps) and float((steps < 0.5 * np.median(steps)).mean()) < REGULAR_SHARE:
         return table[order], (*found, f"{back} rows were not in the order of t_s: sorted by it")
