@@ -12,7 +12,7 @@ import pytest
 from beacons.beacon_walk import SEED, Walk, beacon_walk, demo, heard, merged
 from echostep.angles import mean_angle
 from echostep.localization import Start, digest
-from echostep.localization.belief import Hypothesis
+from echostep.localization.belief import CloudHypothesis
 from echostep.plan import Pose
 from echostep.ports.chunks import GATEWAY, Chunk, portion_of
 from echostep.tracker import Tracker
@@ -59,7 +59,7 @@ def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk
     assert tracker.beacon_places(at.t_s)
     near = Start(Pose(at.x_m, at.y_m, at.heading_rad, at.level), 0.2)
     walk_rad = mean_angle(before.cloud.turn_rad, before.cloud.weight)
-    before.belief.clouds[0] = Hypothesis(before.new_cloud(near, at.heading_rad - walk_rad), 0.0)
+    before.belief.tracked = CloudHypothesis(before.new_cloud(near, at.heading_rad - walk_rad), 0.0)
     assert tracker.beacon_places(at.t_s) == []
     assert not tracker.own_beacons()
     last = tracker.take(portion_of(walk.chunks[half:]))[-1]

@@ -15,13 +15,14 @@ from hypothesis import strategies as st
 from echostep.localization import Building, CloudSettings, Estimate, FilterSettings, MapFilter, Start, TrackStatus
 from echostep.localization.belief import (
     ANOTHER_M,
+    BY_CHANCE,
     HERE_M,
     LEAST,
     PLAN_FITS,
     TEMPER,
     Belief,
+    CloudHypothesis,
     CrossedWalls,
-    Hypothesis,
 )
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.cloud import Cloud, cloud_about
@@ -41,17 +42,17 @@ NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
 
 def no_cloud() -> Cloud:
     """All of a cloud that a belief looks at."""
-    return cast(Cloud, SimpleNamespace())
+    return cast(Cloud, SimpleNamespace(is_searching=False))
 
 
 def no_search() -> Search:
     """All of a search that a belief looks at."""
-    return cast(Search, SimpleNamespace())
+    return cast(Search, SimpleNamespace(is_searching=True))
 
 
 def total(belief: Belief) -> float:
     """The weights of all hypotheses of this building."""
-    return math.exp(belief.log_elsewhere) + sum(math.exp(each.log_weight) for each in belief.hypotheses)
+    return math.exp(belief.log_elsewhere) + sum(math.exp(each.log_weight) for each in belief.clouds)
 
 
 log_ratios = st.floats(-8.0, 8.0)
@@ -76,8 +77,8 @@ def test_probabilities_are_those_without_logarithms(
     )
     for name, one, other in taken:
         if name == "weigh":
-            belief.weigh_clouds([(one / TEMPER, 0.0)])
-            belief.weigh_search(other / TEMPER)
+            for each, log_ratio in zip(belief.clouds, (one, other), strict=False):
+                each.weigh(log_ratio / TEMPER, 0.0)
             belief.judge_plan()
             naive.weigh({"tracked": math.exp(one), "search": math.exp(other)})
         elif name == "move":
@@ -102,29 +103,20 @@ def test_a_place_that_is_found_is_tracked_if_it_is_likelier(log_ratio: float, is
     cloud, search = no_cloud(), no_search()
     belief = Belief(cloud, 0.5, PLAN_FITS)
     belief.begin_search(search, 0.0)
-    belief.weigh_search(log_ratio / TEMPER)
+    assert belief.search is not None
+    belief.search.weigh(log_ratio / TEMPER, 0.0)
     belief.judge_plan()
     belief.prune()
     assert belief.tracked.cloud is cloud  # a search that has found nothing yet is no place
     found = no_cloud()
-    belief.find([(found, 0.6), (no_cloud(), 0.3)])
-    assert math.exp(belief.log_elsewhere) == pytest.approx(0.1 / (1.0 + math.exp(-log_ratio)), rel=1e-6)
+    belief.find(belief.search, found)
+    assert math.exp(belief.log_elsewhere) == pytest.approx(BY_CHANCE / (1.0 + math.exp(-log_ratio)), rel=1e-6)
     belief.prune()
     assert (belief.tracked.cloud is found) == is_tracked
     assert total(belief) == pytest.approx(1.0)
-    belief.merge(belief.clouds[1])
-    assert len(belief.clouds) == 2
+    belief.merge()
     assert belief.search is None
     assert total(belief) == pytest.approx(1.0)
-
-
-def test_clouds_are_compared_by_all_of_their_evidence_and_with_elsewhere_by_a_part_of_it() -> None:
-    belief = Belief(no_cloud(), 0.5, PLAN_FITS)
-    belief.clouds.append(Hypothesis(no_cloud(), math.log(0.4)))
-    belief.weigh_clouds([(2.0, 0.0), (1.0, 0.0)])
-    first, second = (math.exp(each.log_weight) for each in belief.clouds)
-    assert first / second == pytest.approx(0.5 / 0.4 * math.e)
-    assert first + second == pytest.approx(0.9 * ((0.5 * math.exp(2.0) + 0.4 * math.e) / 0.9) ** TEMPER)
 
 
 def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be_tracked() -> None:
@@ -132,19 +124,20 @@ def test_a_search_that_is_improbable_ends_and_a_cloud_that_is_lets_the_search_be
         clouds = no_cloud(), no_search()
         belief = Belief(clouds[0], 0.5, PLAN_FITS)
         belief.begin_search(clouds[1], 0.0)
-        belief.weigh_search(log_ratio / TEMPER)
+        belief.clouds[1].weigh(log_ratio / TEMPER, 0.0)
         belief.judge_plan()
         belief.prune()
-        assert [each.cloud for each in belief.hypotheses] == [clouds[survivor]]
+        assert belief.tracked.cloud is clouds[survivor]
+        assert belief.search is None
         assert total(belief) == pytest.approx(1.0)
 
 
 def test_a_new_search_takes_the_place_of_one_that_is_tracked() -> None:
-    belief, begun = Belief(None, STATED, PLAN_FITS), no_search()
-    belief.begin_search(no_search(), 0.0)
-    belief.leave(0.6)
+    belief = Belief(no_search(), 0.4, PLAN_FITS)
+    begun = no_search()
     belief.begin_search(begun, 0.0)
-    assert [each.cloud for each in belief.hypotheses] == [begun]
+    assert belief.tracked.cloud is begun
+    assert belief.search is None
     assert belief.tracked.log_weight == pytest.approx(0.0)
     assert belief.plan_fits == pytest.approx(PLAN_FITS)
 
@@ -163,7 +156,7 @@ def test_a_plan_on_which_nothing_is_explained_is_another_buildings() -> None:
     """However long: the probability stays a number."""
     belief = Belief(no_cloud(), STATED, PLAN_FITS)
     for _ in range(100):
-        belief.weigh_clouds([(-50.0, -6.0)])
+        belief.tracked.weigh(-50.0, -6.0)
         belief.judge_plan(5.0)
         belief.begin_search(no_search(), -50.0)
     assert belief.plan_fits < 1e-6
@@ -204,7 +197,7 @@ def with_found(at: Pose, weight: float) -> MapFilter:
     two = filter_at(HERE)
     found = cloud_about(SMALL, Start(at, 0.1, 0.05), 0.0, np.random.default_rng(1))
     two.belief.tracked.log_weight = math.log(1.0 - weight)
-    two.belief.clouds.append(Hypothesis(found, math.log(weight)))
+    two.belief.search = CloudHypothesis(found, math.log(weight))
     two.belief.log_elsewhere = -math.inf
     return two
 
@@ -222,14 +215,14 @@ def test_of_two_places_the_likelier_is_the_position(weight: float, pose: Pose) -
 def test_a_place_that_is_found_twice_is_one() -> None:
     one = with_found(HERE, 0.5)
     estimate = after_a_step(one)
-    assert len(one.belief.clouds) == 1
+    assert one.belief.search is None
     assert estimate.right > 0.95
 
 
 @pytest.mark.parametrize(("fits", "status"), [(PLAN_FITS, TrackStatus.TRACKING), (0.7, TrackStatus.UNCERTAIN)])
 def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: TrackStatus) -> None:
     on_it = filter_at(HERE)
-    on_it.belief = Belief(on_it.belief.clouds[0].cloud, 0.999, fits)
+    on_it.belief = Belief(on_it.belief.tracked.cloud, 0.999, fits)
     estimate = after_a_step(on_it)
     assert estimate.plan_fits == pytest.approx(fits, abs=0.01)
     assert estimate.right == pytest.approx(0.999 * (fits if fits < SURE else 1.0), abs=0.01)
@@ -240,9 +233,10 @@ def test_a_place_is_as_sure_as_the_plan_that_it_is_on(fits: float, status: Track
 def test_a_cloud_that_is_doubted_is_searched_for_and_not_claimed(start: Start, status: TrackStatus) -> None:
     doubted = filter_at(HERE)
     doubted._way.begin = wide(start)  # as long as all of the way from there is known; then anywhere
-    doubted.belief = Belief(doubted.belief.clouds[0].cloud, 0.2, PLAN_FITS)
+    doubted.belief = Belief(doubted.belief.tracked.cloud, 0.2, PLAN_FITS)
     estimate = after_a_step(doubted)
     assert doubted.belief.search is not None
+    assert doubted.belief.search.cloud.is_searching
     assert estimate.right < SURE
     assert estimate.status is status
 
@@ -254,9 +248,7 @@ def test_a_wall_that_is_not_there_costs_a_believed_cloud_its_price_once() -> Non
         values[:] = 0.0
     costs = []
     for k, dx_m in enumerate([2.0, -2.0]):
-        crossed = through.belief.clouds[0].crossed
-        through.belief = Belief(through.belief.clouds[0].cloud, 0.99999, 0.999)
-        through.belief.clouds[0].crossed = crossed
+        through.belief = Belief(through.belief.tracked.cloud, 0.99999, 0.999)
         step = PathSegment(k, k + 1.0, dx_m, 0.0, 0.0, 0.0, sd_m=0.01, turn_sd_rad=0.001, step=k, anchor_sd_m=0.0)
         fits = through.update(MeasuredSegment(step, NONE, NO_RANGERS, NONE)).plan_fits
         costs.append(math.log(fits / (1.0 - fits)) - math.log(0.999 / 0.001))

@@ -58,7 +58,7 @@ def test_after_a_change_of_the_storey_meanwhile_the_last_one_is_not_claimed(stor
     resumed = filter_of(Start(there, 1.0, math.pi, air=Air(ZERO_M, 0.15), after_pause=True))
     for k in range(6):
         estimate = resumed.update(standing(k, ZERO_M + storey * STOREY_M))
-    search = resumed.belief.hypotheses[-1].cloud.particles
+    search = next(each.cloud.particles for each in resumed.belief.clouds if each.cloud.is_searching)
     assert np.bincount(search.level, search.weight, 3)[storey] > 0.99
     if storey == 0:
         assert estimate.right > PLAN_FITS * STATED * (1.0 - UNOBSERVED_DOUBT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A search in a building whose storeys are alike, and the way that its clouds walk: levels are as probable as the echoes make them."""
+"""A search in a building whose storeys are alike, and its second pass along the way: levels are as probable as the echoes make them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ import pytest
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoSettings, echo_model
 from echostep.echoes.unplanned import UsablePings
-from echostep.localization import Building, Estimate, MapFilter, Start, TrackStatus
+from echostep.height.levels import Air
+from echostep.localization import Building, CloudSettings, Estimate, MapFilter, Start, TrackStatus
 from echostep.localization.motion import height_change, move_of
+from echostep.localization.particles.cloud import PASSING, cloud_about
 from echostep.localization.window import MOST_PIECES, PAST_M, RecentWay
 from echostep.particles.arrays import Move
 from echostep.particles.limits import BELIEVED
 from echostep.path import MeasuredSegment
-from echostep.plan import Plan
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep.walls.level_sheet import lay_out_levels
@@ -33,7 +35,7 @@ pytestmark = pytest.mark.slow
 STOREYS, TRUE, WRONG = 3, 1, 2
 SEED = 5
 WALKED_M = 30.0
-ECHO = EchoSettings()
+ECHO, SETTINGS = EchoSettings(), CloudSettings()
 MODEL = echo_model(ECHO)
 ANYWHERE = Start()
 TOUR = (
@@ -92,25 +94,25 @@ def way_in(where: Building, walked_m: float = WALKED_M) -> RecentWay:
     return way
 
 
-def true_end() -> tuple[float, float]:
-    """True place at the end of the way."""
+def true_end(level: int) -> tuple[Pose, float]:
+    """True pose at the end of the way, on this level, and the trunk's heading in the walk frame."""
     last = segments(WALKED_M)[-1].segment
-    t_s, x, y, *_ = walk().truth.T
-    return float(np.interp(last.t1_s, t_s, x)), float(np.interp(last.t1_s, t_s, y))
+    t_s, x, y, heading, _ = walk().truth.T
+    x_m, y_m, heading_rad = (float(np.interp(last.t1_s, t_s, values)) for values in (x, y, np.unwrap(heading)))
+    return Pose(x_m, y_m, heading_rad, level), last.heading1_rad
 
 
 def level_shares(where: Building, start: Start = ANYWHERE) -> list[float]:
-    """Probability of each level by the clouds that a search has found along the way; `start`: of the search."""
-    begun = MapFilter(where, start, walk().segments[0].segment.heading0_rad, np.random.default_rng(1)).belief.search
-    assert begun is not None
-    way, shares, (x_m, y_m) = way_in(where), np.zeros(STOREYS), true_end()
-    way.search(begun.cloud, MODEL)
-    found = way.births(begun.cloud, MODEL, where.walls)
-    for cloud, share in found:
-        shares += share * cloud.level_shares
-    likeliest, _ = max(found, key=lambda birth: birth[1])
-    assert np.hypot(likeliest.weight @ likeliest.map_x_m - x_m, likeliest.weight @ likeliest.y_m - y_m) < 0.5
-    return (shares / shares.sum()).tolist()
+    """Probability of each level after the second pass of a cloud that has gathered at the true place, but on level WRONG; `start`: of the search."""
+    pose, walk_heading_rad = true_end(WRONG)
+    rng = np.random.default_rng(1)
+    cloud = cloud_about(SETTINGS, Start(pose, 0.2), walk_heading_rad, rng, where.sheet, None, where.floor)
+    cloud.is_on_any_level = start.is_on_any_level
+    way_in(where).pass_again(cloud, MODEL, where.walls)
+    assert (len(cloud.x_m) <= PASSING) == cloud.is_on_any_level
+    true, _ = true_end(TRUE)
+    assert np.hypot(cloud.weight @ cloud.map_x_m - true.x_m, cloud.weight @ cloud.y_m - true.y_m) < 0.3
+    return np.bincount(cloud.level, cloud.weight, STOREYS).tolist()
 
 
 def tracked(where: Building, seed: int = 1) -> list[Estimate]:
@@ -119,16 +121,17 @@ def tracked(where: Building, seed: int = 1) -> list[Estimate]:
     return [filtered.update(measured) for measured in segments(WALKED_M)]
 
 
-def test_levels_that_are_alike_are_about_as_probable_after_the_way() -> None:
+def test_levels_that_are_alike_are_about_as_probable_after_the_second_pass() -> None:
     assert level_shares(alike()) == pytest.approx([1.0 / STOREYS] * STOREYS, abs=0.25)
 
 
-def test_doors_tell_the_true_level_by_the_way() -> None:
+def test_doors_tell_the_true_level_by_the_second_pass() -> None:
     assert level_shares(different())[TRUE] > BELIEVED
 
 
-def test_a_level_that_is_known_stays() -> None:
-    assert level_shares(alike(), Start(level=WRONG))[WRONG] == pytest.approx(1.0)
+@pytest.mark.parametrize("start", [Start(level=WRONG), Start(air=Air(0.0, 1.0))])
+def test_a_level_that_is_known_stays(start: Start) -> None:
+    assert level_shares(alike(), start)[WRONG] == pytest.approx(1.0)
 
 
 def test_the_way_has_a_bound() -> None:
@@ -140,7 +143,7 @@ def test_standing_does_not_lengthen_the_way_for_ever() -> None:
     pings = UsablePings(different().background(MODEL), ECHO).take(standing)[0]
     for _ in range(MOST_PIECES + 10):
         way.add(Move(0.0, 0.0, 0.0, 0.0), pings, height_change(standing, 0.0))
-    assert len(way._pieces) == MOST_PIECES
+    assert len(way) == MOST_PIECES
 
 
 def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
@@ -149,8 +152,8 @@ def test_on_levels_that_are_alike_none_is_tracked_and_all_are_listed() -> None:
     assert all(e.status is not TrackStatus.TRACKING for e in last)
     assert np.mean([e.levels for e in last], axis=0).min() > 0.1
     assert all({h.level for h in e.hypotheses} == {0, 1, 2} for e in last)
-    x_m, y_m = true_end()
-    assert np.hypot(last[-1].x_m - x_m, last[-1].y_m - y_m) < 0.5
+    true, _ = true_end(TRUE)
+    assert np.hypot(last[-1].x_m - true.x_m, last[-1].y_m - true.y_m) < 0.5
 
 
 def test_on_levels_that_differ_the_right_one_is_tracked() -> None:

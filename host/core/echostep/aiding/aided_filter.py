@@ -15,13 +15,14 @@ import numpy as np
 from echostep.aiding.beacon_map import BeaconMap
 from echostep.aiding.team.meeting import WRONG, Meeting, start_at
 from echostep.aiding.team.meeting_memory import MeetingEffect, MeetingMemory, moved_by
-from echostep.aiding.team.meetings import weigh, weigh_by
+from echostep.aiding.team.meetings import weigh_by
 from echostep.beacons.model import BeaconSettings
 from echostep.board.gateway import BeaconReading
-from echostep.localization.belief import Hypothesis
 from echostep.localization.building import Building
 from echostep.localization.estimate import Estimate
+from echostep.localization.grid.search import Search
 from echostep.localization.map_filter import MapFilter
+from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import FilterSettings
 from echostep.particles.limits import PROBABLE
@@ -51,8 +52,8 @@ class AidedFilter(MapFilter):
     def _aid(self, segment: PathSegment) -> None:
         """Reweight the tracked cloud, at the end of a segment, by the readings on the segment."""
         readings = self._readings
-        for tracked in self.belief.clouds[:1]:
-            self.beacon_map.update(tracked.cloud, segment, readings, bool(readings) and self.plan_supports)
+        if isinstance(self.cloud, Cloud):
+            self.beacon_map.update(self.cloud, segment, readings, bool(readings) and self.plan_supports)
 
     def meet(self, meeting: Meeting) -> MeetingEffect:
         """Reweight the clouds by the place of a teammate next to the wearer, and choose the tracked one.
@@ -63,15 +64,13 @@ class AidedFilter(MapFilter):
         """
         area_m2 = self.building.floor.area_m2
         refusal = MeetingEffect.EMPTY if area_m2 <= 0.0 else self._refusal(meeting)
-        effect = refusal or self._weigh(meeting, area_m2)
-        self._find()
-        return effect
-
-    def _weigh(self, meeting: Meeting, area_m2: float) -> MeetingEffect:
-        """Reweight the hypotheses by a meeting that counts, and choose the tracked one."""
+        if refusal is not None:
+            return refusal
         fits = [weigh_by(each, meeting, area_m2) for each in self.belief.clouds]
-        if self.belief.search is not None:
-            fits.append(weigh(self.belief.search.cloud, meeting, area_m2, is_search=True))
+        for each in self.belief.clouds:
+            found = each.cloud.found() if isinstance(each.cloud, Search) else None
+            if found is not None:
+                self.belief.find(each, found)
         if meeting.beacon is not None:
             self.belief.normalise()
             return MeetingEffect.USED if fits[0] >= PROBABLE else MeetingEffect.CONTRADICTS
@@ -84,7 +83,7 @@ class AidedFilter(MapFilter):
         if moved is None:
             return MeetingEffect.CONTRADICTS
         self._met.agree()
-        self._track_from(meeting, moved, fits)
+        self._track_from(meeting, moved, search_fits=fits[-1] >= PROBABLE)
         return MeetingEffect.MOVED
 
     def _refusal(self, meeting: Meeting) -> MeetingEffect | None:
@@ -94,12 +93,13 @@ class AidedFilter(MapFilter):
             self._met.forget_beacons()
         return self._met.refusal(meeting)
 
-    def _track_from(self, meeting: Meeting, right: float, fits: list[float]) -> None:
-        """Believe the hypothesis that fits a meeting best, if one does, otherwise a new cloud about the teammate, with any heading."""
-        belief, best = self.belief, int(np.argmax(fits))
-        if fits[best] < PROBABLE:
-            at, best = start_at(meeting), len(belief.clouds)
-            start = Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi)
-            belief.clouds.append(Hypothesis(self.new_cloud(self.building.drawn.widened(start), 0.0), -math.inf))
-        belief.raise_to(belief.hypotheses[best], right)
-        belief.prune()
+    def _track_from(self, meeting: Meeting, right: float, *, search_fits: bool) -> None:
+        """Track the search from now on if it agrees with a meeting, otherwise a new cloud about the teammate, with any heading."""
+        belief = self.belief
+        if belief.search is not None and search_fits:
+            belief.tracked, belief.search = belief.search, belief.tracked
+            belief.search.table = None
+        else:
+            at = start_at(meeting)
+            belief.tracked.cloud = self.new_cloud(Start(Pose(at.x_m, at.y_m, 0.0, at.level), at.sd_m, math.pi), 0.0)
+        belief.raise_to(belief.tracked, right)

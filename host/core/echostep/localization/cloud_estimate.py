@@ -49,14 +49,14 @@ def moments(cloud: Particles, weight: Floats, walk_heading_rad: float) -> Moment
 
 
 def weight_about(cloud: Particles, at: Moments | Pose, z_m: float, map_sd_m: float = 0.0) -> tuple[float, float]:
-    """Weight of a cloud within TRACKING_M of a place in the map and HALF_STOREY_M of its height, and within LOST_M of it on whatever level.
+    """Weight of a cloud within TRACKING_M and within LOST_M of a place in the map, and within HALF_STOREY_M of its height.
 
     `map_sd_m`: standard deviation per axis of the map itself there. A particle then counts by the probability that the map is off by less than the
     rest of the limit: a lower bound for the sum of both errors.
     """
-    away_m, on_level = _away_m(cloud, at), np.abs(cloud.z_m - z_m) < HALF_STOREY_M
-    near, about = (cloud.weight * _within(limit - away_m, map_sd_m) for limit in (TRACKING_M, LOST_M))
-    return float(near @ on_level), float(about.sum())
+    here = cloud.weight * (np.abs(cloud.z_m - z_m) < HALF_STOREY_M)
+    near, about = (float(here @ _within(limit - _away_m(cloud, at), map_sd_m)) for limit in (TRACKING_M, LOST_M))
+    return near, about
 
 
 def _within(left_m: Floats, sd_m: float) -> Floats:

@@ -18,7 +18,7 @@ from echostep.echoes.range_bias import RangeBias
 from echostep.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
 from echostep.height.height_filter import RelativeHeight, RidingHeight
 from echostep.height.levels import Air, HeightChange
-from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, Hypothesis
+from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
 from echostep.localization.building import Building
 from echostep.localization.cloud_estimate import estimate_of, weight_about
 from echostep.localization.estimate import Estimate
@@ -62,17 +62,15 @@ class MapFilter:
         echo = with_plan_error(self._settings)
         self._pings = UsablePings(building.background(self._model), echo, self._settings.cloud.rough_m)
         self._bias = RangeBias(self.echo.sd_m)
-        start = building.drawn.widened(start)
-        prior, plan_fits = (STATED, PLAN_FITS) if building.has_walls else (BY_DEFINITION, 1.0)
-        is_anywhere = is_unknown(start) and len(building.floor.x_m) > 0
-        self.belief = Belief(None if is_anywhere else self.new_cloud(start, walk_heading_rad), prior, plan_fits)
+        cloud = self.new_cloud(start, walk_heading_rad)
+        prior = (1.0 if cloud.is_searching else STATED) if building.has_walls else BY_DEFINITION
+        self.belief = Belief(cloud, prior, PLAN_FITS if building.has_walls else 1.0)
+        self._crossed = CrossedWalls()
         self._height = None if building.has_walls else RelativeHeight(self._settings.climb.drift_m)
         self._unmeasured = UnmeasuredWay(on_plan=building.has_walls)
         self._way = RecentWay(wide(start), walk_heading_rad)  # since the last gap
         self._riding = RidingHeight(HEIGHT_SD_M)
         self._barometer_starts = 0  # before the last height by pressure
-        if is_anywhere:
-            self.belief.begin_search(self._search_from(start, walk_heading_rad), 0.0)
         if start.after_pause:
             self.belief.leave(UNOBSERVED_DOUBT)
             self._search_beside(start.air, walk_heading_rad)
@@ -122,7 +120,7 @@ class MapFilter:
         change = self._height_change(measured)
         # 3. A way that was not observed scatters each hypothesis, straight through the building.
         if segment.unobserved:
-            for each in belief.hypotheses:
+            for each in belief.clouds:
                 each.cloud.scatter(move_of(segment), change)
             self._way.clear()
         # 4. After a stand, a pause, a long way that was not observed, the wearer may be elsewhere.
@@ -150,9 +148,12 @@ class MapFilter:
             part.turn_walk_frame(by_rad)
         self._way.clear()
 
-    def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud:
-        """A cloud from a start."""
+    def new_cloud(self, start: Start, walk_heading_rad: float) -> Cloud | Search:
+        """A cloud from a start; a search, if the place is unknown."""
         s, b = self._settings, self.building
+        start = b.drawn.widened(start)
+        if is_unknown(start) and len(b.floor.x_m):
+            return self._search_from(start, walk_heading_rad)
         return cloud_about(s.cloud, start, walk_heading_rad, self._rng, b.sheet, s.climb, b.floor, b.walls.index)
 
     def _search_from(self, start: Start, walk_heading_rad: float) -> Search:
@@ -175,19 +176,21 @@ class MapFilter:
 
         `air`: calibration of the heights by pressure; None if the level is unknown: places above and below are searched more densely than the rest.
         """
-        if not self.belief.clouds or not len(self.building.floor.x_m):
+        if self.belief.tracked.cloud.is_searching or not len(self.building.floor.x_m):
             return
         self._way.clear()
         on_levels = self.cloud.sheet is not None and air is None
-        near = replace(_believed(self.cloud, walk_heading_rad), level=ANY_LEVEL) if on_levels else None
+        near = replace(self._believed(walk_heading_rad), level=ANY_LEVEL) if on_levels else None
         self._begin_search(Start(near=near, sd_m=NEAR_SD_M, heading_sd_rad=math.pi, air=air), walk_heading_rad)
 
     def _begin_search(self, start: Start, walk_heading_rad: float) -> None:
         """Search the building along the last metres of the path."""
         search = self._search_from(start, walk_heading_rad)
         self.belief.begin_search(search, self._way.search(search, self._model))
-        for each in self.belief.clouds:
-            each.table = grid_about(each.cloud, *self._table(), self.building.floor, self._settings, self._rng)
+        if not self.belief.tracked.cloud.is_searching:
+            self.belief.tracked.table = grid_about(
+                self.cloud, *self._table(), self.building.floor, self._settings, self._rng
+            )
 
     def _height_change(self, measured: MeasuredSegment) -> HeightChange:
         """The change of height over a segment. The lag of the height by pressure drifts over a pause; it is forgotten where the heights restart."""
@@ -209,44 +212,47 @@ class MapFilter:
 
     def _follow(self, measured: MeasuredSegment, change: HeightChange) -> tuple[Move, PingBatch]:
         """Propagate along an observed segment; a cloud resamples itself after each reweighting that needs it. Returns the move and its pings."""
-        segment, belief = measured.segment, self.belief
+        segment, belief, walls = measured.segment, self.belief, self.building.walls
         heard = self._bias.corrected(measured) if self.building.has_walls else measured.without_pings
         pings, unplanned = self._pings.take(heard)
         move, path_m = move_of(segment), math.hypot(segment.dx_m, segment.dy_m)
         self._way.add(move, pings, change)
-        share = evidence_share(segment.turn_rad)
-        evidence = [self._trace(each, move, pings, unplanned, share) for each in belief.clouds]
-        if self.building.has_walls:
-            belief.weigh_clouds(evidence)
-        if belief.search is not None:
-            belief.weigh_search(share * belief.search.cloud.advance(move, pings, self._model))
-        belief.weigh_heights([each.cloud.change_levels(move, change) for each in belief.hypotheses])
-        for each in belief.clouds:
-            if each.table is not None:
-                each.table.change_levels(move, change)
-            if (loss := self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m)) is not None:
+        clouds, share = belief.clouds, evidence_share(segment.turn_rad)
+        for each in clouds:
+            if isinstance(each.cloud, Search):
+                each.weigh(share * each.cloud.advance(move, pings, self._model), 0.0)
+            else:
+                self._follow_with(each, each.cloud, move, pings, unplanned, share)
+        belief.weigh_heights([each.change_levels(move, change) for each in clouds])
+        for each in clouds:
+            if isinstance(each.cloud, Search):
+                found = each.cloud.found()
+                if found is not None:
+                    self._way.pass_again(found, self._blurred, walls)
+                    belief.find(each, found)
+            elif (loss := self.building.log_loss_in_air(each.cloud.x_m, each.cloud.y_m, path_m)) is not None:
                 each.cloud.reweight(loss)
-        self._find()
         return move, pings
 
-    def _find(self) -> None:
-        """Track the places that a search has found."""
-        if self.belief.search is not None:
-            self.belief.find(self._way.births(self.belief.search.cloud, self._blurred, self.building.walls))
-
-    def _trace(
-        self, each: Hypothesis[Cloud], move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
-    ) -> tuple[float, float]:  # fmt: skip
-        """Propagate and reweight one cloud; returns this share of the evidence of the pings, and the log of what walls have left."""
+    def _follow_with(
+        self, each: CloudHypothesis, cloud: Cloud, move: Move, pings: PingBatch, unplanned: UnplannedDensities, share: float
+    ) -> None:  # fmt: skip
+        """Propagate and reweight one cloud, and its hypothesis by this share of the evidence of the pings."""
         # By the spacing of sparse particles
-        cloud = each.cloud
         model, alone = (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
         evidence = cloud.propagate_and_reweight(move, pings, model, self.building.walls)
+        # Where there were several places, a light one may have lost its particles on one level by chance.
+        if cloud.is_on_any_level and cloud.is_in_one_place:
+            self._way.pass_again(cloud, self._blurred, self.building.walls)
+            cloud.is_on_any_level = False
         if each.table is not None:
-            return share * each.table.advance(move, pings, self._model), evidence.log_path
-        path_m = math.hypot(move.dx_m, move.dy_m)
-        log_passed = each.crossed.charge(_believed(cloud, 0.0), path_m, evidence.log_path)
-        return share * float(unplanned.counts @ (evidence.log_pings - alone)), log_passed
+            each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
+        elif self.building.has_walls:
+            log_ratio, log_passed = float(unplanned.counts @ (evidence.log_pings - alone)), evidence.log_path
+            if self.belief.search is None:
+                path_m = math.hypot(move.dx_m, move.dy_m)
+                log_passed = self._crossed.charge(self._believed(0.0), path_m, log_passed)
+            each.weigh(share * log_ratio, log_passed)
 
     def _compare(self, segment: PathSegment, move: Move, pings: PingBatch) -> None:
         """Update the belief after a move: end improbable clouds, and merge clouds in one place; learn the bias where the likeliest is."""
@@ -256,32 +262,45 @@ class MapFilter:
         belief.judge_plan(path_m)
         belief.leave(WRONG_PER_M * path_m)
         belief.prune()
-        cloud = self.cloud
-        at, z_m = _believed(cloud, 0.0), float(cloud.weight @ cloud.z_m)
-        for rival in belief.clouds[1:]:
-            if weight_about(rival.cloud, at, z_m)[0] > PROBABLE:
-                belief.merge(rival)
+        if self._is_found_here():
+            belief.merge()
         if len(pings.share) and belief.right > PROBABLE:  # bounded by its prior
+            cloud = self.cloud
             self._bias.learn_behind(cloud.arrays, cloud.weight, move, pings, self.building.walls, self._model)
+
+    def _is_found_here(self) -> bool:
+        """Whether a search has found the place of the tracked cloud."""
+        if self.belief.search is None or self.belief.search.cloud.is_searching:
+            return False
+        cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
+        return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
 
     def _level_m(self) -> float:
         """Height of the tracked cloud in the plan (m) by the level that is believed, NaN: none is."""
-        cloud = self.cloud
+        cloud = self.belief.tracked.cloud
         if cloud.sheet is None:
             return 0.0 if self.building.has_walls else math.nan
-        is_known = self.belief.clouds and cloud.level_shares.max() > BELIEVED
-        return float(cloud.weight @ cloud.z_m) if is_known else math.nan
+        is_known = isinstance(cloud, Cloud) and cloud.level_shares.max() > BELIEVED
+        return float(cloud.particles.weight @ cloud.particles.z_m) if is_known else math.nan
+
+    def _believed(self, walk_heading_rad: float) -> Pose:
+        """The mean pose of the tracked cloud, on its likeliest level."""
+        cloud = self.cloud
+        weight, level = cloud.weight, int(cloud.level_shares.argmax())
+        on = cloud.level == level
+        x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
+        return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)
 
     def _estimate(self, segment: PathSegment) -> Estimate:
         """The estimate at the end of a segment."""
         belief = self.belief
         stood = 1.0 - self._unmeasured.probability
-        mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.hypotheses]
+        mixture = [(each.cloud.particles, stood * belief.probability(each)) for each in belief.clouds]
         cloud, _ = mixture[0]
         hidden_sd_m = HIDDEN_SD_M * cloud.hidden_share
         map_sd_m, drawn = 0.0, self.building.drawn
         if drawn.are_stated:
-            at = _believed(self.cloud, 0.0)
+            at = self._believed(0.0)
             map_sd_m = drawn.sd_m(at.x_m, at.y_m, at.level)
         sd_m = math.hypot(segment.anchor_sd_m, self._settings.plan_sd_m, hidden_sd_m, EXACT_SD_M, map_sd_m)
         return estimate_of(
@@ -289,11 +308,3 @@ class MapFilter:
             None if self._height is None else (self._height.height_m, self._height.sd_m), belief.plan_fits,
             self.building.weight_outside(cloud.x_m, cloud.y_m, cloud.weight), self._unmeasured.on_level,
         )  # fmt: skip
-
-
-def _believed(cloud: Particles, walk_heading_rad: float) -> Pose:
-    """The mean pose of a cloud, on its likeliest level."""
-    weight, level = cloud.weight, int(cloud.level_shares.argmax())
-    on = cloud.level == level
-    x, y = (float(np.average(v[on], weights=weight[on])) for v in (cloud.map_x_m, cloud.y_m))
-    return Pose(x, y, mean_angle(cloud.turn_rad, weight) + walk_heading_rad, level)

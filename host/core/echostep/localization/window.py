@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""The last metres of the path, which are searched, and walked again where levels may be alike.
+"""The last metres of the path, for a second pass: levels of a building are often alike, and a search by the range table
+cannot discriminate between them.
 
-In: moves with their pings and changes of height; a search. Out: the clouds that it has found, at the end of the path. Owns the moves.
+In: moves with their pings and changes of height; a cloud that has just been found. Out: the same cloud, after the pass. Owns the moves.
 
-The range table has half of the information of the echoes. So what a search has found on several levels walks the path again by traced echoes.
+The range table has half of the information of the echoes. So where levels are alike, the exact filter processes the same path a second time, from its
+beginning on every level.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-
-import numpy as np
 
 from echostep.echoes.likelihood import EchoModel
 from echostep.height.levels import HeightChange
@@ -32,6 +32,9 @@ class RecentWay:
         self.begin, self.walk_heading_rad = begin, walk_heading_rad
         self._pieces: deque[tuple[Move, PingBatch, HeightChange]] = deque()
         self.length_m = 0.0
+
+    def __len__(self) -> int:
+        return len(self._pieces)
 
     def add(self, move: Move, pings: PingBatch, change: HeightChange) -> None:
         """One more move."""
@@ -56,27 +59,13 @@ class RecentWay:
             search.change_levels(move, change)
         return log_pings
 
-    def births(self, search: Search, model: EchoModel, walls: Walls) -> list[tuple[Cloud, float]]:
-        """A cloud with its probability for each place that a search has found; none before it is over.
-
-        Where the level is not known, there is one on each, and they walk the way from its beginning: by traced echoes it is known which level it is.
-        A level that is known is kept: stairs may have led there.
-        """
-        places = search.found()
-        if not search.is_on_any_level:
-            return [(search.draw(place), place.probability) for place in places]
-        share = 1.0 / max(search.levels * len(places), 1)
-        clouds = [search.draw(place, level, share) for place in places for level in range(search.levels)]
-        log_share = np.array([self._walk(cloud, model, walls) for cloud in clouds])
-        probability = np.exp(log_share - log_share.max(initial=-math.inf))
-        probability *= sum(place.probability for place in places) / max(float(probability.sum()), 1.0)
-        return list(zip(clouds, probability.tolist(), strict=True))
-
-    def _walk(self, cloud: Cloud, model: EchoModel, walls: Walls) -> float:
-        """Let a cloud walk the way from its beginning; returns the log of its density of the pings, the heights, and of what walls have left."""
-        log_density = 0.0
-        cloud.go_back(sum(move.dx_m for move, _, _ in self._pieces), sum(move.dy_m for move, _, _ in self._pieces))
-        for move, pings, change in self._pieces:
-            evidence = cloud.propagate_and_reweight(move, pings, model, walls)
-            log_density += float(evidence.log_pings.sum()) + evidence.log_path + cloud.change_levels(move, change)
-        return log_density
+    def pass_again(self, cloud: Cloud, model: EchoModel, walls: Walls) -> None:
+        """Let a cloud walk the way once more, from its beginning on each level; not where the level is known: stairs may have led there."""
+        if cloud.sheet is not None and not cloud.is_on_any_level:
+            return
+        dx_m = sum(move.dx_m for move, _, _ in self._pieces)
+        dy_m = sum(move.dy_m for move, _, _ in self._pieces)
+        with cloud.passing_again(dx_m, dy_m):
+            for move, pings, change in self._pieces:
+                cloud.propagate_and_reweight(move, pings, model, walls)
+                cloud.change_levels(move, change)

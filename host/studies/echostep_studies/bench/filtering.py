@@ -74,7 +74,7 @@ def track(segments: Sequence[MeasuredSegment], plan: Plan, start: Start, seed: i
         estimate = map_filter.update(segment)
         cpu_s += time.process_time() - begin_s
         claims.append(_claim(estimate))
-        most = max(most, sum(len(each.cloud.particles.x_m) for each in map_filter.belief.hypotheses))
+        most = max(most, sum(len(each.cloud.particles.x_m) for each in map_filter.belief.clouds))
     return FilterRun(tuple(claims), most, cpu_s)
 
 

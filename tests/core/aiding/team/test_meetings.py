@@ -50,7 +50,7 @@ def moments(c: Cloud) -> tuple[Floats, Floats]:
 
 def filter_at(x_m: float, y_m: float, right: float) -> AidedFilter:
     made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.belief.clouds[0].cloud, right, 1.0)
+    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
     return made
 
 

@@ -32,7 +32,7 @@ def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
 
 def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> AidedFilter:
     made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.belief.clouds[0].cloud, right, 1.0)
+    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
     return made
 
 

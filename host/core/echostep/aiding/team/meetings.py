@@ -27,7 +27,7 @@ import numpy as np
 
 from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 from echostep.arrays import Bools, Floats
-from echostep.localization.belief import Hypothesis
+from echostep.localization.belief import CloudHypothesis
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles
@@ -84,7 +84,7 @@ def places_at(cloud: Particles, meeting: Meeting) -> Floats:
     return np.column_stack([cloud.map_x_m, cloud.y_m]) + way
 
 
-def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float, *, is_search: bool = False) -> float:
+def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     """Reweight a cloud by a meeting on a floor of this area; returns the probability that the meeting is right, given the cloud."""
     particles = cloud.states
     place = places_at(particles, meeting)
@@ -98,8 +98,8 @@ def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float, *, is_search:
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
     density = (1.0 - wrong) * float(weight @ np.exp(log_met))
     right = density / (density + wrong * anywhere)
-    factor = log_met if is_search else None
-    if right >= PROBABLE and not is_search:
+    factor = log_met if cloud.is_searching else None
+    if right >= PROBABLE and not cloud.is_searching:
         factor = _intersection(meeting, place, weight, log_met)
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = meeting.share * factor
@@ -135,13 +135,13 @@ def _range_variance(meeting: Meeting, away: Floats, spread: Floats) -> Floats:
     return np.einsum("ni,ij,nj->n", along, spread, along) + meeting.range_sd_m**2 + RANGE_BODY_SD_M**2
 
 
-def weigh_by(each: Hypothesis[Cloud], meeting: Meeting, area_m2: float) -> float:
+def weigh_by(each: CloudHypothesis, meeting: Meeting, area_m2: float) -> float:
     """Weigh a cloud by a meeting, or by a range to a teammate's beacon; returns the probability that it is right, given the cloud.
 
     A range that the cloud explains worse than chance casts doubt on it; one that it explains takes such doubt back, and gives nothing else.
     """
     right = weigh(each.cloud, meeting, area_m2)
-    if meeting.beacon is not None:
+    if meeting.beacon is not None and not each.cloud.is_searching:
         before = each.doubts.get(meeting.name, 0.0)
         after = before + meeting.share * math.log(WRONG[meeting.status] / max(1.0 - right, LEAST_WRONG))
         each.doubts[meeting.name] = min(max(after, MOST_DOUBT), 0.0)

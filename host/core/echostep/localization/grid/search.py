@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The search of the building: exact Bayes on a grid of cells and headings [Burgard et al. 1998].
 
-In: a start, the input of a `Cloud`. Out: a `Cloud` for each place, once they are few. Owns the weight of each state, and the heights.
+In: a start, the input of a `Cloud`. Out: a `Cloud`, once the place is found. Owns the weight of each state, and the heights.
 
 The lengths and the rotation of the walk frame drift little, so a state moves rigidly with the path, and its error is spread over its
 neighbours. A layer's sector of the rotation is halved when the way within it errs by a cell: the search is as fine as the path is long. Of the many
@@ -11,6 +11,7 @@ states of a large building the heaviest MOST_STATES are kept.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,12 +25,10 @@ from echostep.localization.grid.heights import GridHeights
 from echostep.localization.grid.kernels import GridStates, halved, shift_and_weigh, spread, weigh_levels
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles, PressureLag
-from echostep.localization.particles.places import LikelyPlace, hypotheses
 from echostep.localization.particles.start import Start
 from echostep.localization.settings import UNPLANNED_DOOR, FilterSettings
 from echostep.particles.arrays import DrawnPoses, Move, PingBatch
-from echostep.particles.kernels import MovePiece, effective_size, piece_of, systematic
-from echostep.particles.limits import ROOM_M
+from echostep.particles.kernels import MovePiece, piece_of, systematic
 from echostep.path import bend_of
 from echostep.walls.floor import CELL_M
 from echostep.walls.level_sheet import LevelSheet
@@ -41,17 +40,19 @@ MOST_STATES = 300_000  # a millisecond a ping
 SPREAD_M, SPREAD_RAD = 0.05, math.radians(1.0)  # standard deviations on a metre: per axis, and of the rotation
 SPREAD_SHARE = 0.05  # of a state's weight that is due to each neighbour when it is spread
 MOST_BESIDE, MOST_TURNED = 0.2, 0.25  # of the weight that a neighbour gets at most: the peak remains
-# Weight outside of the places below which a search is over, the most clouds that are born then, and the least path where there are levels; assumed
-FOUND_REST, MOST_BORN, LEVELS_M = 0.1, 8, 10.0
-TRACED_M2_RAD = 5.0  # effective size of a search that so many can trace, assumed
-WALKING = 5_000  # particles of all clouds that walk the way again: about a second for 40 m
+# Weight outside of one place below which a search has found it, on one level, and on several, there after this length of search: exact likelihoods
+# discriminate between levels that are alike, and need a path to do so; assumed
+FOUND_REST, LEVELS_REST, LEVELS_M = 0.03, 0.1, 10.0
 SHOWN = 5_000  # states that stand for all of a larger search
+TRACED_M2_RAD = 5.0  # poses that 20,000 particles fill by the sizes of `CloudSettings`: 6,000 cells
 SCATTERED_SHARE = 0.8  # weight of a search that stays about its places after a move that was not observed, assumed
 NO_PING_BEND = bend_of(math.radians(45.0))  # of a move's chord, above which its pings do not count: an uncertain turn
 
 
 class Search(PressureLag):
     """The weights of all poses on the grid. `is_on_any_level`: nothing is known of the level."""
+
+    is_searching: ClassVar[bool] = True
 
     def __init__(
         self, cells: GridCells, places: tuple[Floats, Floats], unplanned: RangeMemory, start: Start, sheet: LevelSheet | None,
@@ -60,7 +61,7 @@ class Search(PressureLag):
         """Begin evenly at these places x, y (n,) on the sheet, with any rotation. `unplanned`: density without a plan, as inexact as the table."""
         super().__init__(start.lag_variance, settings.climb)
         self.sheet, self._settings, self._rng = sheet, settings.cloud, rng
-        self.is_on_any_level = sheet is None or start.is_on_any_level
+        self.is_on_any_level = sheet is not None and start.is_on_any_level
         self._cells, self._places = cells, places
         self._heights = None if sheet is None else GridHeights(sheet, settings.climb, start)
         self._turned_rad = 0.0  # of the walk frame since the search began
@@ -108,11 +109,6 @@ class Search(PressureLag):
 
     def __len__(self) -> int:
         return len(self._states.cell)
-
-    @property
-    def levels(self) -> int:
-        """Number of levels of the building."""
-        return 1 if self.sheet is None else len(self.sheet.height_m)
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all states: the heading in the walk frame has changed while the heading on the map has not."""
@@ -205,40 +201,35 @@ class Search(PressureLag):
     def _spread(self, beside: float, turned: float) -> None:
         self._states = spread(self._states, beside, turned, self._least, self._scratch, self._cells)
 
-    def found(self) -> tuple[LikelyPlace, ...]:
-        """The places that are left, the likeliest first, once a cloud each can trace them; none before that."""
-        if self.sheet is not None and self.path_m < LEVELS_M:
-            return ()
-        states = self.particles
-        level = np.zeros(len(states.x_m), np.int64) if self.is_on_any_level else states.level
-        most = max(MOST_BORN // self.levels, 1) if self.is_on_any_level else MOST_BORN
-        places = hypotheses(states.map_x_m, states.y_m, level, states.turn_rad, states.weight)[:most]
-        size = effective_size(self._states.weight.astype(np.float64)) / len(self._states.offset_m)
-        if size * CELL_M**2 * 2.0 * math.pi > TRACED_M2_RAD:
-            places = places[:1]
-        return places if sum(place.probability for place in places) > 1.0 - FOUND_REST else ()
+    def found(self) -> Cloud | None:
+        """The cloud, if the search is over: all is in one place, or in few enough for a cloud to trace."""
+        rest, least_m = (FOUND_REST, 0.0) if self.sheet is None else (LEVELS_REST, LEVELS_M)
+        if self.path_m < least_m:
+            return None
+        if self.densest_share(TRACED_M2_RAD) <= 1.0 - FOUND_REST and self.particles.place_share <= 1.0 - rest:
+            return None
+        cloud = self.draw(self._settings.largest)
+        cloud.contract()
+        cloud.is_on_any_level = self.is_on_any_level
+        return cloud
+
+    def densest_share(self, size_m2_rad: float) -> float:
+        """Weight of the heaviest states that together have this size."""
+        weight = self._states.weight
+        count = int(size_m2_rad / (CELL_M**2 * 2.0 * math.pi / len(self._states.offset_m)))
+        if count >= len(weight):
+            return 1.0
+        return float(np.partition(weight, len(weight) - count)[len(weight) - count :].sum() / weight.sum())
 
     def scatter(self, move: Move, change: HeightChange) -> None:
         """Begin again about the places that are reached by an unobserved move, as of a cloud."""
-        cloud = self._cloud_of(self._states.weight.astype(np.float64), self._settings.largest)
+        cloud = self.draw(self._settings.largest)
         cloud.scatter(move, change)
         self.begin_about(cloud.x_m, cloud.y_m, cloud.turn_rad, SCATTERED_SHARE)
 
-    def draw(self, place: LikelyPlace, level: int | None = None, share: float = 1.0) -> Cloud:
-        """The cloud of a place; for a level, of the poses on all laid on that one, with this share of WALKING particles, but the least of a cloud."""
-        states, s = self.states, self._settings
-        here = np.hypot(states.map_x_m - place.x_m, states.y_m - place.y_m) < ROOM_M
-        if level is not None:
-            cloud = self._cloud_of(states.weight * here, max(int(share * min(WALKING, s.largest)), s.size))
-            cloud.lay_on(level)
-            return cloud
-        cloud = self._cloud_of(states.weight * (here & (states.level == place.level)), s.largest)
-        cloud.contract()
-        return cloud
-
-    def _cloud_of(self, weight: Floats, count: int) -> Cloud:
-        """A cloud of `count` poses by the weights of the states (n,), evenly within their cells and sectors."""
-        poses = self._poses(systematic(weight, float(self._rng.random()), count))
+    def draw(self, count: int) -> Cloud:
+        """A cloud of `count` poses, evenly within their cells and sectors."""
+        poses = self._poses(systematic(self._states.weight.astype(np.float64), float(self._rng.random()), count))
         within = self._rng.random((3, count)) - 0.5
         turn = poses.turn_rad + 2.0 * math.pi / len(self._states.offset_m) * within[2]
         poses = poses._replace(x_m=poses.x_m + CELL_M * within[0], y_m=poses.y_m + CELL_M * within[1], turn_rad=turn)

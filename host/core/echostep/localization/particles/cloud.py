@@ -12,7 +12,10 @@ Weights are logarithms.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -40,7 +43,8 @@ from echostep.walls.level_sheet import LevelSheet, level_of
 SCATTERED = 10 / 3  # times the least size above which a cloud is roughened: a gathered one is never that large
 START_SIZE = 6_000  # least particles at the start: enough of them in the tails of its distribution (`start`)
 LEAST_LEVEL = 0.01  # probability of a level that counts among those on which the trunk may be, assumed
-BORN_ROUGH = 0.5, math.radians(2.0)  # spread (m, rad) of a place that a grid has found: it is off by this much
+# Particles of a second pass (about a second for 40 m), and roughening (m, rad) of the places tried again: a coarse place is off by this much
+PASSING, PASSING_ROUGH = 5_000, (0.5, math.radians(2.0))
 # Bend of a particle's way beyond the segment's bend, as a share of it: none to two arcs of a circle: a person turns on the spot, or walks
 # round the end of a wall more sharply than an arc
 BENDS = (-1.0, 3.0)
@@ -75,10 +79,12 @@ class Cloud(Particles):
 
     A cloud is scattered or contracted by its number of particles, gathered or in one place by its spread: see the properties of these names.
     `is_gathered`: since it last was scattered by an unobserved move, less than GATHERED_REST of its weight was once farther than ROOM_M from its mean
-    on the sheet.
+    on the sheet. `is_on_any_level`: a search has found it on several levels, between which the last metres of the path have not yet discriminated.
     """
 
-    is_gathered = False
+    is_searching: ClassVar[bool] = False
+
+    is_gathered, is_on_any_level = False, False
 
     def __init__(
         self, poses: DrawnPoses, settings: CloudSettings, rng: np.random.Generator, sheet: LevelSheet | None,
@@ -163,17 +169,36 @@ class Cloud(Particles):
         self.resample_if_needed()
         return log_mean
 
-    def go_back(self, dx_m: float, dy_m: float) -> None:
-        """Go back to the beginning of the way of (dx, dy) in the walk frame, spread by BORN_ROUGH."""
-        self._roughen(*BORN_ROUGH)
+    @contextmanager
+    def passing_again(self, dx_m: float, dy_m: float) -> Iterator[None]:
+        """Go back to the beginning of the way of (dx, dy) in the walk frame, on every level, for a second pass with few particles."""
+        settings = self._settings
+        self._settings = replace(settings, largest=min(PASSING, settings.largest))
+        levels = len(self.sheet.height_m) if self.sheet else 1
+        # Evenly: in a cloud that is not gathered, light places have more particles than by their weight
+        chosen = np.unique(np.linspace(0, len(self.x_m) - 1, max(PASSING // levels, 1)).astype(np.int64))
+        log_weight = self.log_weight
+        self.keep(chosen)
+        self.log_weight = log_weight[chosen]
+        self._roughen(*PASSING_ROUGH)
         c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
         self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
         self.hidden = np.zeros((2, len(self.x_m)))
+        if self.sheet:
+            self._lay_on_each_level(self.sheet)
+        try:
+            yield
+        finally:
+            self._settings = settings
 
-    def lay_on(self, level: int) -> None:
-        """Move all particles to a level; the lag becomes unknown."""
-        self.x_m = self.map_x_m + level * self.pitch_m
-        self.z_m = np.full(len(self.x_m), self.sheet.height_m[level] if self.sheet else 0.0)
+    def _lay_on_each_level(self, sheet: LevelSheet) -> None:
+        """Copy every particle to each level; the lag becomes unknown."""
+        levels, log_weight = len(sheet.height_m), self.log_weight
+        level = np.tile(np.arange(levels), len(self.x_m))
+        self.keep(np.repeat(np.arange(len(self.x_m)), levels))
+        self.log_weight = np.repeat(log_weight, levels)
+        self.x_m = self.map_x_m + level * sheet.pitch_m
+        self.z_m = sheet.height_m[level]
         self.forget_lag()
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
@@ -222,6 +247,11 @@ class Cloud(Particles):
         log_chosen = log_weight[chosen]
         self.keep(chosen)
         self.log_weight = log_chosen - log_chosen.max()
+
+    @property
+    def is_in_one_place(self) -> bool:
+        """Whether the cloud is gathered, or would be if all levels lay above one another."""
+        return self.is_gathered or self.far_weight(self.map_x_m) < GATHERED_REST
 
     def _noise(self, move: Move, share: float) -> Floats:
         """Noise of this share of a move in x, y, turn and scale of each particle, and of its bend, (5, n)."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
+from echostep.localization.particles.places import hypotheses
 from echostep.localization.settings import CloudSettings
 from echostep.particles.arrays import DrawnPoses, ParticleArrays
 from echostep.particles.limits import ROOM_M
@@ -108,6 +109,12 @@ class Particles(PressureLag):
     def hidden_share(self) -> float:
         """Probability that the view of a ranger is hidden, mean of both."""
         return float((self.hidden @ self.weight).mean())
+
+    @property
+    def place_share(self) -> float:
+        """Weight of the likeliest place, on any level; 0 if none has enough to be listed."""
+        places = hypotheses(self.map_x_m, self.y_m, np.zeros(len(self.x_m), np.int64), self.turn_rad, self.weight)
+        return places[0].probability if places else 0.0
 
     @property
     def level_shares(self) -> Floats:
