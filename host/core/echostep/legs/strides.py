@@ -197,8 +197,7 @@ class StrideEstimator:
         window = np.column_stack([self._grid.thigh[first : k + 1], shank[first : k + 1]])
         rates = np.diff(window, axis=0) * GRID_HZ
         smoothed = np.column_stack([leg_swings.smooth(rates[:, 0]), leg_swings.smooth(rates[:, 1])])
-        calm = np.ptp(smoothed, axis=0) < leg_swings.STILL_RANGE_RAD_S
-        if not (calm & (np.abs(smoothed.mean(axis=0)) < leg_swings.STILL_MEAN_RAD_S)).all():
+        if not leg_swings.is_still(smoothed):
             if self._still_since is not None:
                 self._end_standing(k - 5)
                 self._still_since = None
@@ -278,9 +277,7 @@ class StrideEstimator:
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         self._bout.strike = strike
         self._bout.toe_off = self._bout.peaks[-2] + leg_swings.toe_off_index(rate, len(rate) - 1, strike)
-        # The direction does not change from stride to stride, but a stride that ends a walk has hardly any lead
-        lead, before = leg_swings.thigh_lead(np.column_stack([np.diff(thigh), np.diff(shank)])), self._bout.lead
-        self._bout.lead = lead if np.isnan(before) else 0.5 * (lead + before)
+        self._bout.add_lead(leg_swings.thigh_lead(np.column_stack([np.diff(thigh), np.diff(shank)])))
         if self._bout.lead < leg_swings.BACKWARD_LEAD:
             return 0.0, 0.0, Flag.BACKWARD, max(BLIND_SD_M, abs(length))
         if length < SHORTEST_M or way.passed() < LEAST_PASSED * length:
@@ -306,9 +303,7 @@ class StrideEstimator:
         rate = leg_swings.smooth(np.diff(shank) * GRID_HZ)
         off = leg_swings.toe_off_index(rate, span - 1, 0)
         phase = TOE_OFF + (np.arange(len(shank)) - off) / bout.cycle
-        early = np.abs(rate[: max(off - STANCE * bout.cycle // 100, 0)])
-        calm = not len(early) or float(early.max()) < 0.4 * self.swings.threshold() / leg_swings.PEAK_SHARE  # no swing
-        stood = bout.stood or calm
+        stood = bout.stood or self._calm(rate[: max(off - STANCE * bout.cycle // 100, 0)])
         stance = 0 if stood else int(np.argmax(phase > 0.0))
         way = travel(phase, thigh, shank, self.settings.segments, struck=None)
         length = PELVIS * float(way.forward_m[off] - way.forward_m[stance]) + pace * stance / GRID_HZ
@@ -324,6 +319,10 @@ class StrideEstimator:
             [b.value for b in self.bias]
         )
         return len(rates) > 0 and float(np.abs(rates).max()) < leg_swings.MOVING_RAD_S
+
+    def _calm(self, rate: Floats) -> bool:
+        """Whether the shank's rates (n,) hold no swing, so that the foot stands."""
+        return not len(rate) or float(np.abs(rate).max()) < 0.4 * self.swings.threshold() / leg_swings.PEAK_SHARE
 
     def _end_bout(self, end: int, *, stands: bool) -> None:
         """End the bout at this grid index, because the leg stands or because the samples end."""

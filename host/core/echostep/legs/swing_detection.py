@@ -124,6 +124,12 @@ def thigh_lead(rates: Floats) -> float:
     return lead / (len(LAGS) * size) if size > 0.0 else 0.0
 
 
+def is_still(rates: Floats) -> bool:
+    """Whether a leg stands during these rates (n, 2)."""
+    calm = bool((np.ptp(rates, axis=0) < STILL_RANGE_RAD_S).all())
+    return calm and bool((np.abs(rates.mean(axis=0)) < STILL_MEAN_RAD_S).all())
+
+
 def mid_swing_index(shank: Floats, peak: int) -> int:
     """Index of mid swing in the shank's rates (n,) about a peak: the centroid of the rate above TOP_SHARE of the peak's.
 

@@ -51,6 +51,10 @@ class Bout:
     blind: Flag = Flag.NONE  # UNSEEN or BACKWARD
     lead: float = math.nan  # of the thigh before the shank, mean of the last strides
 
+    def add_lead(self, lead: float) -> None:
+        """Add the lead of one stride: the direction does not change from stride to stride, but a stride that ends a walk has hardly any lead."""
+        self.lead = lead if math.isnan(self.lead) else 0.5 * (lead + self.lead)
+
 
 def climbs(knee_at_strike: float, knee_half_later: float) -> bool:
     """Whether the knee (rad) straightens or bends under load as on stairs; a drift of the angles does not matter."""

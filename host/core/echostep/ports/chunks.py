@@ -66,6 +66,9 @@ class PortBytes:
         return self.row[np.searchsorted(self.end, ends)]
 
 
+_NO_BYTES = PortBytes(b"", np.empty(0, np.int64), np.empty(0, np.int64))
+
+
 @dataclass(frozen=True, slots=True)
 class Portion:
     """Chunks in order of arrival, as columns (n,).
@@ -104,6 +107,8 @@ class Portion:
 
     def of(self, name: str) -> PortBytes:
         """All bytes of the named port."""
+        if name not in self.ports:
+            return _NO_BYTES
         row = self._rows_from(name)
         start, end = self.start[row], self.end[row]
         total = (end - start).cumsum()

@@ -179,6 +179,9 @@ class MtxReader:
     def _decode(self, frames: MtFrames) -> Messages:
         """Values of all measurement messages in order; other messages are counted."""
         legacy = (frames.mid == MTDATA) & (frames.length == self._output.length)
+        if legacy.all():
+            rows = copy_payloads(frames.stream, frames.body, self._output.length)
+            return Messages(*decode_mtdata(rows, self._output), frames.bus, frames.end)
         self._count_others(frames)
         count = len(frames.mid)
         decoded = Decoded(np.empty((count, mt.COLUMNS)), np.empty(count, np.int64), np.empty((count, 4), np.bool_))
