@@ -8,7 +8,6 @@ floats, and of a board's messages. Owns nothing.
 from __future__ import annotations
 
 import heapq
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,13 +22,12 @@ from echostep.board.messages import GYROS_INVALID, PRESSURE_TEMPERATURE_INVALID,
 from echostep.errors import EchostepError
 from echostep.offline.csv_table import lines_of, open_samples
 from echostep.offline.imu_csv import LIMITS, Imu
-from echostep.ports.chunks import BOARD, MTX, Chunk
-from echostep.ports.imu_samples import SampleCounter
+from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import imu_settings, parse_settings, read_settings
 from echostep.timing.timeline import TICKS_PER_S
-from echostep.xsens import MTDATA2, encode_frame
 from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foreign_columns import OWN, Naming, read_header
+from echostep_app.offline.imu_chunks import ImuChunks
 from echostep_app.offline.leg_csv import load_pair
 from echostep_app.offline.ros_bag import RANGE, is_bag, read_bag
 from echostep_app.recording.recorder import Recorder
@@ -39,8 +37,6 @@ GAP = 1.5  # periods: a longer step is a gap
 AT_ONCE = 10_000  # samples, which bound the memory
 FARTHEST_M = 0.5 * 65_535e-6 * SPEED_OF_SOUND_M_S  # that a ping can state
 RANGES = ("t_s", "direction_deg", "range_m")
-_SAMPLE = struct.Struct(">HBHHB3fHB3f")  # packets of identifier, length and value [LLCP, MTData2]
-_COUNTER, _ACCEL, _GYRO = 0x1020, 0x4020, 0x8020
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,25 +77,6 @@ def import_imu(imu: Imu, name: str, out: Path, about: Mapping[str, str], beside:
     more = f"{len(within)} messages of {sensors}, {outside} left out as before or after the foot's; " * bool(messages)
     told = f"{kept} samples at {rate_hz:.4g} Hz, {chunks.left_out} left out as within the same period; {more}"
     return f"{told}t_s of its track counts from {begin_s:.3f} s in the file"
-
-
-class ImuChunks:
-    """Samples of any foot IMU as messages of an MTx, MTData2, with values as 32-bit floats, arriving at the times of the samples."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self._counter = SampleCounter(rate_hz)
-
-    @property
-    def left_out(self) -> int:
-        """Samples within the same period as the one before."""
-        return self._counter.left_out
-
-    def of(self, t_s: Floats, accel: Floats, gyro: Floats) -> Iterator[Chunk]:
-        """Chunks of samples as in `SampleCounter.of`."""
-        rows = (column.tolist() for column in self._counter.of(t_s, accel, gyro))
-        for counter, t_arrival_ns, force, rate in zip(*rows, strict=True):
-            payload = _SAMPLE.pack(_COUNTER, 2, counter, _ACCEL, 12, *force, _GYRO, 12, *rate)
-            yield Chunk(MTX, t_arrival_ns, encode_frame(MTDATA2, payload))
 
 
 def rate_of(t_s: Floats) -> float:

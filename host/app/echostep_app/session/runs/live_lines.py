@@ -20,7 +20,7 @@ from echostep.offline.imu_checks import ROOM, is_filled, out_of_line, unwrapped
 from echostep.offline.imu_csv import COLUMNS
 from echostep.ports.chunks import Chunk
 from echostep_app.offline.foreign_columns import read_header
-from echostep_app.offline.importing import ImuChunks
+from echostep_app.offline.imu_chunks import ImuChunks
 
 LONGEST_LINE = 1000  # bytes; a longer one is dropped
 MOST = 1e10  # of any number in SI: seconds since 1970 are below it for three centuries; assumed
