@@ -79,6 +79,11 @@ def new_window() -> SampleWindow:
     return SampleWindow(np.zeros(RING), np.zeros((RING, 3)), np.zeros((RING, 3)), np.zeros(1, np.int64))
 
 
+def new_zaru_sums() -> ZaruSums:
+    """Sums of an empty rest."""
+    return ZaruSums(np.zeros(3), np.zeros(1), np.zeros(3), np.zeros(1), np.zeros(1), np.zeros(3))
+
+
 @lean_kernel
 def add_sample(window: SampleWindow, t_s: float, accel: Floats, gyro: Floats) -> None:
     """Write a sample into the ring."""

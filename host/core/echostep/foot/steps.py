@@ -145,7 +145,7 @@ class Foot:
         self._zupt["height_m"] = (settings or FootSettings()).height_m
         self.nav = ins.new_nav(noise or ins.Noise())
         self._window = stance.new_window()
-        self._sums = stance.ZaruSums(*map(np.zeros, (3, 1, 3, 1, 1, 3)))
+        self._sums = stance.new_zaru_sums()
         self._compass = new_compass()
 
     @property

@@ -147,12 +147,16 @@ class Heading:
             self.P[HEADING, HEADING] += MISSING_WALK_RAD**2 * dt
         elif not self._has_rate:
             self._has_rate = True
-            if self.known and not self._given:  # by the compass: known as by a first reading
-                self.P[HEADING] = self.P[:, HEADING] = 0.0
-                self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
+            if self.known and not self._given:  # by the compass
+                self._know_by_first_reading()
         self._since_s += dt
         if self._since_s >= STEP_S:
             self._propagate_covariance()
+
+    def _know_by_first_reading(self) -> None:
+        """The heading has the error of the compass's first reading, whatever it was before."""
+        self.P[HEADING] = self.P[:, HEADING] = 0.0
+        self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
 
     def _propagate_covariance(self) -> None:
         """Propagate the covariance over the time since the last propagation."""
@@ -175,12 +179,15 @@ class Heading:
             return
         self._bins.append(total / count)
         if len(self._bins) == CALM_BINS and max(self._bins) - min(self._bins) < CALM_RAD_S:
-            # A trunk at rest does not turn: its rate is a measurement of the bias
-            innovation = self._bins[CALM_BINS // 2] - float(self.state[BIAS])
-            if abs(innovation) < GATE_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
-                row = np.zeros(SIZE)
-                row[BIAS] = 1.0
-                self._update(row, innovation, self.settings.rest_sd_rad_s**2)
+            self._zero_rate_update(self._bins[CALM_BINS // 2])
+
+    def _zero_rate_update(self, rate: float) -> None:
+        """A trunk at rest does not turn: its rate is a measurement of the bias."""
+        innovation = rate - float(self.state[BIAS])
+        if abs(innovation) < GATE_SD * (self.settings.rest_sd_rad_s + self.settings.bias_sd_rad_s):
+            row = np.zeros(SIZE)
+            row[BIAS] = 1.0
+            self._update(row, innovation, self.settings.rest_sd_rad_s**2)
 
     def _compass_update(self, t_s: float, compass: float) -> None:
         """One reading of the compass: the first one, also after a gap, sets an unknown heading; a later one must be steady and within the gate."""
@@ -190,8 +197,7 @@ class Heading:
         if not self.known:
             self.known, self.unbroken_s = True, t_s
             self.state[HEADING] += wrap(compass - heading)
-            self.P[HEADING] = self.P[:, HEADING] = 0.0
-            self.P[HEADING, HEADING] = self.settings.first_sd_rad**2
+            self._know_by_first_reading()
             self._last, self._turned = (t_s, compass), 0.0
             return
         waves = harmonics(heading)
@@ -225,6 +231,11 @@ class Heading:
         self.state += gain * innovation
         self.P = self.P - np.outer(gain, covariance)
         self.P = 0.5 * (self.P + self.P.T)
+
+
+def missing_sd_rad(span_s: float) -> float:
+    """How far a trunk turns in a time without samples, 1 sd: a random walk."""
+    return MISSING_WALK_RAD * math.sqrt(span_s)
 
 
 def harmonics(heading_rad: float | Floats) -> Floats:

@@ -19,7 +19,7 @@ import numpy as np
 
 from echostep.arrays import Floats
 from echostep.legs.clipping import ClippingRepair
-from echostep.legs.heading import MISSING_WALK_RAD, CompassErrors, Heading, HeadingSettings
+from echostep.legs.heading import CompassErrors, Heading, HeadingSettings, missing_sd_rad
 from echostep.legs.kinematics import USUAL_M, LegLengths
 from echostep.legs.stride import Flag, Stride, StrideSettings
 from echostep.legs.strides import StrideEstimator
@@ -109,7 +109,7 @@ class LegPath:
     def unseen_sd_rad(self, t_s: float) -> float:
         """How far the trunk may have turned, 1 sd, between a time and the nearest sample."""
         times = np.array([t for t, _ in self._headings])
-        return MISSING_WALK_RAD * math.sqrt(float(np.abs(times - t_s).min()))
+        return missing_sd_rad(float(np.abs(times - t_s).min()))
 
     def _stride_segment(self, stride: Stride) -> PathSegment | None:
         """The segment of a stride, without the time already covered by standing; None when nothing is left."""
@@ -131,7 +131,7 @@ class LegPath:
         scale_sd = 0.0 if standing else SCALE_SD if self._begun else stride.scale_sd
         self._begun = self._begun or not standing
         sd = math.hypot(stride.length_sd_m, CURVE_SD * length * (1.0 - math.hypot(ahead, aside)), turned_sd)
-        unseen_rad = MISSING_WALK_RAD * math.sqrt(t1 - t0) if Flag.GAP in stride.flags else 0.0
+        unseen_rad = missing_sd_rad(t1 - t0) if Flag.GAP in stride.flags else 0.0
         turn_sd = math.hypot(TURN_SD_RAD, self._heading.bias_sd_rad_s * (t1 - t0), unseen_rad)
         return PathSegment(
             t0, t1, length * ahead, length * aside,

@@ -277,11 +277,11 @@ class MapFilter:
 
     def _level_m(self) -> float:
         """Height of the tracked cloud in the plan (m) by the level that is believed, NaN: none is."""
-        cloud = self.belief.tracked.cloud
-        if cloud.sheet is None:
+        tracked = self.belief.tracked.cloud
+        if tracked.sheet is None:
             return 0.0 if self.building.has_walls else math.nan
-        is_known = isinstance(cloud, Cloud) and cloud.level_shares.max() > BELIEVED
-        return float(cloud.particles.weight @ cloud.particles.z_m) if is_known else math.nan
+        is_known = not tracked.is_searching and self.cloud.level_shares.max() > BELIEVED
+        return float(self.cloud.weight @ self.cloud.z_m) if is_known else math.nan
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""
