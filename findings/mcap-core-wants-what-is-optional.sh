@@ -2,7 +2,7 @@
 # One would expect each reader of MCAP to find the messages of a file without what the specification makes optional: chunks, or message indexes.
 # Without chunks the indexed reader of @mcap/core and Rerun's converter give no message, and no error, though the statistics say five.
 # Without message indexes the former refuses the file. mcap 1.6.0, for Python, wrote both by its own options, and reads all five.
-# It hurts whoever writes message by message so that a crash loses nothing, or saves the 16 bytes a message: Foxglove's reader shows none of it.
+# It hurts recordings written message by message, so that a crash loses nothing, or to save 16 bytes a message: Foxglove's reader shows none of it.
 set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

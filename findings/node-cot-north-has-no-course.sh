@@ -2,7 +2,7 @@
 # One would expect @tak-ps/node-cot to turn an event into GeoJSON and back with the course, the speed and the accuracy that it had.
 # A course of 0, due north, is lost on the way back, as a number that is not true; and the speed is taken over only if there is a course.
 # The accuracies ce and le come back as 9999999, which stands for unknown. Nothing is raised.
-# It hurts the maps built on it, as CloudTAK: who walks due north has no heading, and who has no compass no speed.
+# It hurts the maps built on it, as CloudTAK: a track due north has no heading, and a track without a compass no speed.
 set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -2,7 +2,7 @@
 # One would expect a converter of CoT events to TAK's protobuf to keep its rule (detail.proto): an element with more than its message has room for
 # goes as a whole into xmlDetail. takproto and node-cot write the message and drop the rest: phone, readiness, slope. Neither says so.
 # node-cot drops `precisionlocation` altogether, which has a message of its own: it looks for the element's name, not for the field's.
-# It hurts whoever gets the event behind a TAK server: that a position is computed, not measured, and how to call its wearer, is known in XML alone.
+# It hurts what receives the event behind a TAK server: that a position is computed, not measured, and the wearer's phone are known in XML alone.
 set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -255,9 +255,8 @@ class MtxSetup:
     @property
     def _device_text(self) -> str:
         """Product and firmware, after a colon."""
-        firmware = self._answers.get(REQUEST_FIRMWARE.name, b"")[
-            :3
-        ]  # major, minor and revision [LLCP, FirmwareRevision]
+        # Major, minor and revision [LLCP, FirmwareRevision]
+        firmware = self._answers.get(REQUEST_FIRMWARE.name, b"")[:3]
         known = [self.product, f"firmware {'.'.join(map(str, firmware))}" if len(firmware) == 3 else ""]
         return ": " + ", ".join(filter(None, known)) if any(known) else ""
 

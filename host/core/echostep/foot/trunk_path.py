@@ -132,7 +132,8 @@ class TrunkPath:
         x, y = self._trunk_xy(heading)
         half_s = self._half_s()
         t0, x0, y0, heading0 = self._anchor or (landed_s + half_s - 1.0, x, y, heading)
-        gain = 2.0 if self._rests_s and self._rests_s[-1] > STANDING_S else 1.0  # who has stood speeds up evenly
+        # After a stand the trunk speeds up evenly
+        gain = 2.0 if self._rests_s and self._rests_s[-1] > STANDING_S else 1.0
         m_s = gain * math.hypot(x - x0, y - y0) / max(landed_s + half_s - t0, RUN_STANCE_S)
         t_s = max(landed_s + min(half_s, REACH_M / max(m_s, REACH_M)), t0)
         self._anchor = (t_s, x, y, heading)

@@ -74,9 +74,8 @@ def unwrapped(t_s: Floats, period_s: float) -> Floats:
 def out_of_line(t_s: Floats, period_s: float) -> Bools:
     """Whether each time (n,) is outside of its two neighbours', which have a place for it: a single wrong stamp. The ends have one neighbour."""
     before, at, after = t_s[:-2], t_s[1:-1], t_s[2:]
-    return np.concatenate([[False], (after - before > ROOM * period_s) & ((at < before) | (at > after)), [False]])[
-        : len(t_s)
-    ]
+    off = (after - before > ROOM * period_s) & ((at < before) | (at > after))
+    return np.concatenate([[False], off, [False]])[: len(t_s)]
 
 
 def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
@@ -84,10 +83,8 @@ def sorted_by_time(table: Floats) -> tuple[Floats, tuple[str, ...]]:
     period_s = float(np.median(np.abs(np.diff(table[:, TIME])))) if len(table) > 1 else 0.0
     table[:, TIME] = unwrapped(table[:, TIME], period_s)
     off = out_of_line(table[:, TIME], period_s)
-    table, found = (
-        table[~off],
-        (f"{int(off.sum())} times are out of line with their neighbours': skipped",) * bool(off.any()),
-    )
+    found = (f"{int(off.sum())} times are out of line with their neighbours': skipped",) if off.any() else ()
+    table = table[~off]
     t_s = table[:, TIME]
     back = int((np.diff(t_s) < 0.0).sum())
     if not back:

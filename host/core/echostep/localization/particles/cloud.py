@@ -132,9 +132,8 @@ class Cloud(Particles):
         """
         log_evidence, log_passed = np.zeros(len(pings.share)), 0.0
         turns, count = move.bend_x_m != 0.0 or move.bend_y_m != 0.0, len(self.x_m)
-        self.bend = (
-            self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
-        )  # relative to the bend of BENT of an arc
+        # Relative to the bend of BENT of an arc
+        self.bend = self._rng.uniform(*BENDS, count) if turns else np.zeros(count)
         progress, settings = MoveProgress(0.0, 0), self._settings
         cloud_model = CloudModel(settings.wall_cost, settings.resample_below, model)
         while progress.share < 1.0 or progress.ping < len(log_evidence):
