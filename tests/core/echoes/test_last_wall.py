@@ -9,18 +9,13 @@ import numpy as np
 import pytest
 
 from echostep.arrays import Floats
-from echostep.echoes.likelihood import EchoSettings
-from echostep.echoes.unplanned import (
-    BIN_M,
-    Background,
-    LastWall,
-    PlacedPings,
-    RangeMemory,
-    UnplannedDensities,
-)
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.range_memory import DISTANCE, NORMAL, PlacedPings, new_memory, remembered_densities
+from echostep.echoes.unplanned import BIN_M, Background, RangeMemory, UnplannedDensities
 from echostep.localization import FilterSettings
 from echostep.localization.belief import TEMPER
 from echostep.localization.settings import UNPLANNED_DOOR, with_plan_error
+from naive import range_memory
 
 SD_M = 0.036
 SPACING_M = 0.25
@@ -31,26 +26,32 @@ EVERYWHERE = Background(np.full(round(6.0 / BIN_M) + 1, -math.log(6.0)))
 @pytest.mark.parametrize("slant_deg", [-20.0, 0.0, 10.0])
 def test_a_straight_wall_is_foretold(slant_deg: float) -> None:
     normal_rad = 0.5 * math.pi + math.radians(slant_deg)
-    step_m = SPACING_M * np.array([1.0, 0.0])
-    distance_m = 1.5
-    wall = LastWall(distance_m, 0.5 * math.pi, SD_M, 0.05)
-    for _ in range(8):
-        distance_m -= float(step_m @ (math.cos(normal_rad), math.sin(normal_rad)))
-        wall.move(*step_m)
-        wall.update(distance_m, 0.5 * math.pi, 1.0)
-    wall.move(*step_m)
-    distance_m -= float(step_m @ (math.cos(normal_rad), math.sin(normal_rad)))
-    assert wall.distance_m == pytest.approx(distance_m, abs=0.01)
-    assert wall.normal_rad == pytest.approx(normal_rad, abs=math.radians(2.0))
+    x_m = SPACING_M * np.arange(9)
+    range_m = 1.5 - x_m * math.cos(normal_rad)
+    memory = new_memory()
+    remembered_densities(memory, along(x_m, range_m), np.full(9, -math.log(6.0)), 0.0, echo_model(ECHO))
+    assert memory[0, DISTANCE] == pytest.approx(range_m[-1], abs=0.01)
+    assert memory[0, NORMAL] == pytest.approx(normal_rad, abs=math.radians(2.0))
+
+
+def test_what_is_remembered_is_as_by_matrices() -> None:
+    rng = np.random.default_rng(3)
+    ranger, way_m, axis_rad = rng.integers(0, 2, 300), 0.2 * rng.standard_normal((2, 300)), 0.3 * rng.standard_normal(300)
+    range_m = np.where(rng.random(300) < 0.2, 0.0, np.where(rng.random(300) < 0.2, 4.0, 1.5) + 0.05 * way_m[0])
+    pings = PlacedPings(ranger, *way_m.cumsum(axis=1), 0.2 * axis_rad.cumsum() + ranger, range_m, 0.1 + 0.6 * rng.random(300))
+    args = pings, np.log(0.05 + 0.1 * rng.random(300)), 0.2, echo_model(ECHO)
+    assert np.allclose(remembered_densities(new_memory(), *args), range_memory.densities(*args), rtol=1e-6)
+
+
+def along(x_m: Floats, range_m: Floats) -> PlacedPings:
+    """Pings of the left ranger on a way along x."""
+    ones = np.ones(len(x_m))
+    return PlacedPings(np.zeros(len(x_m), np.int64), x_m, 0.0 * ones, 0.5 * math.pi * ones, range_m, ones)
 
 
 def densities(range_m: Floats, echo: EchoSettings = ECHO) -> UnplannedDensities:
     """Of echoes of the left ranger every SPACING_M on a way along x."""
-    count = len(range_m)
-    x_m: Floats = np.linspace(0.0, SPACING_M * (count - 1), count)
-    ones = np.ones(count)
-    pings = PlacedPings(np.zeros(count, np.int64), x_m, 0.0 * ones, 0.5 * math.pi * ones, range_m, ones)
-    return RangeMemory(EVERYWHERE, echo).densities(pings)
+    return RangeMemory(EVERYWHERE, echo).densities(along(SPACING_M * np.arange(len(range_m)), range_m))
 
 
 def log_planned(range_m: Floats, true_m: float) -> Floats:

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from echostep.echoes.likelihood import PRIOR_HEARD, PRIOR_MISSED, EchoSettings, MissedEchoes, echo_model
+from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.echoes.range_memory import HEARD, MISSED, PRIOR_HEARD, PRIOR_MISSED, PlacedPings, new_memory, remembered_densities
 from echostep.echoes.unplanned import UsablePings
 from echostep.errors import EchostepError
 from echostep.localization import Building, MapFilter, Start
@@ -80,10 +81,11 @@ PRIOR = PRIOR_MISSED / PRIOR_HEARD
 
 
 def odds(ranges_m: list[float], ranger: int = 0) -> float:
-    missed = MissedEchoes()
-    for range_m in ranges_m:
-        missed.update(0, range_m)
-    return missed.odds(ranger)
+    """Odds that an echo is missed after echoes of the left ranger, 0 for none."""
+    memory, at_m = new_memory(), np.zeros(len(ranges_m))
+    pings = PlacedPings(at_m.astype(np.int64), at_m, at_m, at_m, np.array(ranges_m), at_m + 1.0)
+    remembered_densities(memory, pings, at_m - 2.0, 0.0, echo_model(EchoSettings()))
+    return float(memory[ranger, MISSED] / memory[ranger, HEARD])
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5])

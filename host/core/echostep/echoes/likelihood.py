@@ -22,12 +22,6 @@ from echostep.jit import inline_kernel, inline_part, lean_kernel
 from echostep.walls.tile_points import CORNER, EDGE
 
 # Assumed, not measured.
-# Pings: a ranger in order misses one echo in two hundred; a faulty one is known after two seconds
-PRIOR_MISSED, PRIOR_HEARD = 0.1, 20.0
-LIKE_M = 0.15  # difference of two echoes from one wall: three errors of their difference
-SURE_M = 3.0  # range within which a wall is detected surely: half of the ranger's
-MOST_SILENT = 8  # pings between two such echoes: more mean a door
-REMEMBERED = 200.0  # pings: tens of metres of path
 ABSORPTION_DB_M = 2.6  # dB per metre of distance, there and back, 40 kHz in air [ISO 9613-1]
 DB = 20.0 / math.log(10.0)  # decibels per unit of the natural logarithm of a distance
 # Sources are omitted where a nearer one is detected but for this probability, assumed
@@ -41,35 +35,6 @@ SURE_RAD = math.radians(20.0)  # angle off the axis within which a near wall sur
 SURE_COS = math.cos(SURE_RAD)
 MINIMAL_M, FARTHEST_M = 1e-3, 100.0  # distances between which any ranger's limits lie
 GATE_SD = 6.0  # a source further from the range than this many standard deviations adds nothing
-
-
-class MissedEchoes:
-    """Counts for two rangers."""
-
-    def __init__(self) -> None:
-        self._missed = [PRIOR_MISSED, PRIOR_MISSED]
-        self._heard = [PRIOR_HEARD, PRIOR_HEARD]
-        self._last_m = [math.nan, math.nan]  # last echo
-        self._silent = [0, 0]  # pings since
-
-    def odds(self, ranger: int) -> float:
-        """Odds that an echo is missed, not received."""
-        return self._missed[ranger] / self._heard[ranger]
-
-    def update(self, ranger: int, range_m: float) -> None:
-        """Count a ping; range 0: no echo."""
-        if range_m <= 0.0:
-            self._silent[ranger] += 1
-            return
-        is_sure = range_m < SURE_M and abs(range_m - self._last_m[ranger]) < LIKE_M
-        if is_sure and self._silent[ranger] <= MOST_SILENT:
-            self._count(ranger, self._silent[ranger])
-        self._last_m[ranger], self._silent[ranger] = range_m, 0
-
-    def _count(self, ranger: int, silent: int) -> None:
-        missed, received = self._missed[ranger] + silent, self._heard[ranger] + 1.0
-        memory = min(1.0, REMEMBERED / (missed + received))
-        self._missed[ranger], self._heard[ranger] = memory * missed, memory * received
 
 
 @dataclass(frozen=True, slots=True)

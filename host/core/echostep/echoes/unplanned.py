@@ -3,12 +3,10 @@
 or as predicted by the last echoes.
 
 In: walls, their floor, `MeasuredSegment`s in order of time. Out: `Background`: log-density by range; `PingBatch` and the pings'
-densities without a plan. Owns the views of both rangers, each the line in the walk frame that it detected last, or none, and the length of the path.
+densities without a plan. Owns what is remembered of both rangers, and the length of the path.
 
 A cloud that explains the echoes no better than this density is wrong, or the plan is. So the density is the best possible without a plan: a
-continuing wall is predicted as well as by the plan; the plan has more information only where a view changes. A smooth wall answers from the foot of
-the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended Kalman filter of distance and
-direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
+continuing wall is predicted as well as by the plan; the plan has more information only where a view changes.
 """
 
 from __future__ import annotations
@@ -18,122 +16,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
-from echostep.echoes.likelihood import (
-    STRAY_ON,
-    EchoModel,
-    EchoSettings,
-    MissedEchoes,
-    detection,
-    echo_density,
-    echo_model,
-    normal,
-)
+from echostep.echoes.likelihood import EchoModel, EchoSettings, echo_density, echo_model
+from echostep.echoes.range_memory import VIEW_RAD, PlacedPings, new_memory, remembered_densities
 from echostep.jit import kernel
 from echostep.particles.arrays import PingBatch
 from echostep.path import MeasuredSegment, Odometer
 from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
 from echostep.walls.floor import Floor
-from echostep.walls.index import CONE_RAD, WallIndex
-from echostep.walls.tile_points import WALL
+from echostep.walls.index import WallIndex
 
 # Assumed, not measured.
-# Of a new wall's normal about the ranger's axis: half of the angle at which walls answer
-AXIS_SD_RAD = math.radians(20.0)
-TURN_SD_RAD = 0.05  # change of the normal on a metre of path
-VIEW_M = 2.5  # mean length of the path between two changes of a view: walls, doors, corners
 POSES = 400  # drawn on the floor: their mean is then good to 5 %
 BIN_M = 0.05  # width of a bin of ranges
-VIEW_RAD = 2.0 * CONE_RAD  # mean turn of a ranger between two changes of its view: the width of its cone
 LEAST_POWER = 0.01  # share of independent information below which a ping is left out: it changes nothing
 # Turns on a segment at which its pings count half: headings between its ends are interpolated
 TURNING_RAD = math.radians(45.0)  # as weights of particles
 EVIDENCE_RAD = math.radians(15.0)  # as evidence for the cloud: they select the path of a turn, and are predicted badly
-
-
-class LastWall:
-    """`distance_m`, `normal_rad`: the line seen from where the last echo was received; their covariance."""
-
-    def __init__(self, range_m: float, axis_rad: float, sd_m: float, slant_m: float) -> None:
-        """Begin with a first echo. Standard deviation of a range: `sd_m`, and `slant_m` per radian off the axis."""
-        self._sd_m, self._slant_m = sd_m, slant_m
-        self.distance_m, self.normal_rad = range_m, axis_rad
-        self._var_m2, self._covariance_m, self._var_rad2 = sd_m**2, 0.0, AXIS_SD_RAD**2
-
-    def move(self, dx_m: float, dy_m: float) -> None:
-        """Predict the line as seen after this way in the walk frame."""
-        c, s = math.cos(self.normal_rad), math.sin(self.normal_rad)
-        self.distance_m -= c * dx_m + s * dy_m
-        across = s * dx_m - c * dy_m  # change of the distance with the normal
-        self._var_m2 += across * (2.0 * self._covariance_m + across * self._var_rad2)
-        self._covariance_m += across * self._var_rad2
-        self._var_rad2 += TURN_SD_RAD**2 * math.hypot(dx_m, dy_m)
-
-    def densities(self, range_m: float, axis_rad: float, blur_m: float, model: EchoModel) -> tuple[float, float]:
-        """Density (1/m) of an echo of this wall, and blurred by a standard deviation; it is detected as a wall of the plan would be."""
-        detected = detection(self.distance_m, abs(wrap(self.normal_rad - axis_rad)), WALL, model)
-        off_m, variance_m2 = range_m - self.distance_m, self._var_m2 + self._error_m(axis_rad) ** 2
-        blurred = normal(off_m, math.sqrt(variance_m2 + blur_m**2))
-        return detected * normal(off_m, math.sqrt(variance_m2)), detected * blurred
-
-    def update(self, range_m: float, axis_rad: float, power: float) -> None:
-        """Correct the line by an echo, whose error counts by `power`: errors of successive echoes are alike."""
-        total = self._var_m2 + self._error_m(axis_rad) ** 2 / power
-        gain_m, gain_rad = self._var_m2 / total, self._covariance_m / total
-        difference = range_m - self.distance_m
-        self.distance_m += gain_m * difference
-        self.normal_rad += gain_rad * difference
-        self._var_rad2 -= gain_rad * self._covariance_m
-        self._covariance_m -= gain_m * self._covariance_m
-        self._var_m2 -= gain_m * self._var_m2
-
-    def _error_m(self, axis_rad: float) -> float:
-        """Standard deviation of a range."""
-        return self._sd_m + self._slant_m * abs(wrap(self.normal_rad - axis_rad))
-
-
-class UnplannedView:
-    """The view of one ranger without a plan: for each ping call `move`, `densities`, `update`, in this order."""
-
-    def __init__(self, echo: EchoSettings) -> None:
-        self._echo, self._model = echo, echo_model(echo)
-        self._wall: LastWall | None = None  # None before the first echo
-        self._x_m, self._y_m, self._axis_rad = math.nan, math.nan, math.nan
-
-    @property
-    def is_silent(self) -> bool:
-        """Whether the last ping had no echo, or there was no ping."""
-        return self._wall is None
-
-    def move(self, x_m: float, y_m: float, axis_rad: float) -> float:
-        """Advance to the place and axis of the next ping; returns the probability that the view is the same there, 0 for the first one."""
-        dx_m, dy_m, turn_rad = x_m - self._x_m, y_m - self._y_m, abs(wrap(axis_rad - self._axis_rad))
-        self._x_m, self._y_m, self._axis_rad = x_m, y_m, axis_rad
-        if math.isnan(dx_m):
-            return 0.0
-        if self._wall is not None:
-            self._wall.move(dx_m, dy_m)
-        return math.exp(-math.hypot(dx_m, dy_m) / VIEW_M - turn_rad / VIEW_RAD)
-
-    def densities(self, range_m: float, axis_rad: float, stray: float, blur_m: float) -> tuple[float, float]:
-        """Density (1/m) of a range if the view continues, and blurred by a standard deviation; range 0: the probability of no echo.
-
-        `stray`: probability of a second reflection where nothing answers.
-        """
-        if self._wall is None:
-            return (1.0 - stray if range_m <= 0.0 else stray / (self._echo.maximum_m - self._echo.minimum_m),) * 2
-        return (0.0, 0.0) if range_m <= 0.0 else self._wall.densities(range_m, axis_rad, blur_m, self._model)
-
-    def update(self, range_m: float, axis_rad: float, power: float, goes_on: bool) -> None:
-        """Update by a ping; `goes_on`: whether the view continues, by the densities."""
-        if range_m <= 0.0:
-            if not goes_on:  # otherwise it is likelier that an echo was missed
-                self._wall = None
-        elif goes_on and self._wall is not None:
-            self._wall.update(range_m, axis_rad, power)
-        else:
-            self._wall = LastWall(range_m, axis_rad, self._echo.sd_m, self._echo.slant_m)
 
 
 class Background(NamedTuple):
@@ -155,32 +54,22 @@ def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
         return Background(np.full(bins + 1, -math.log(model.maximum_m)))
     rng = np.random.default_rng(0)
     x, y = floor.draw(POSES, rng)
-    density = _mean_density(x, y, 2.0 * math.pi * rng.random(POSES), walls.near(x, y), model, bins)
-    return Background(np.log(density))
-
-
-class PlacedPings(NamedTuple):
-    """Pings (k,): `ranger`; place and axis in the walk frame; `range_m`, 0: no echo; `power`."""
-
-    ranger: Ints
-    x_m: Floats
-    y_m: Floats
-    axis_rad: Floats
-    range_m: Floats
-    power: Floats
+    axis_rad = 2.0 * math.pi * rng.random(POSES)
+    return Background(_log_mean_density(x, y, axis_rad, walls.near(x, y), model, bins))
 
 
 class UnplannedDensities(NamedTuple):
     """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent ping missed
-    its echo, 0 for an echo; `alike`, the density if like the ping before, without these two.
+    its echo, 0 for an echo; `alike`, the density if like the ping before, without these two; `density`, to the pings' power, anywhere in the building
+    or like the ping before; its log, `either`, and `blurred`, as for a scattered cloud.
 
-    Logs of densities to the pings' power, anywhere in the building or like the ping before: `either`, and `blurred` as for a scattered cloud.
     `counts`: share that is evidence for a cloud: information deferred from a turn only selects particles, since the trunk follows the foot late.
     """
 
     stray: Floats
     missed: Floats
     alike: Floats
+    density: Floats
     either: Floats
     blurred: Floats
     counts: Floats
@@ -190,35 +79,19 @@ class RangeMemory:
     """The density of echoes without any plan: the view of the same ranger continues, or it has changed to any in the building."""
 
     def __init__(self, background: Background, echo: EchoSettings, blur_m: float = 0.0) -> None:
-        self._background, self._echo, self._blur_m = background, echo, blur_m
-        self._missed = MissedEchoes()
-        self._views = [UnplannedView(echo), UnplannedView(echo)]
+        self._background, self._model, self._blur_m = background, echo_model(echo), blur_m
+        self._memory = new_memory()
 
     def densities(self, pings: PlacedPings) -> UnplannedDensities:
         """For pings (k,) in order of time."""
-        anywhere = np.exp(self._background.of(pings.range_m))
-        stray, missed, alike, blurred, changed = (np.zeros(len(anywhere)) for _ in range(5))
-        for k, which in enumerate(pings.ranger.tolist()):
-            view, range_m = self._views[which], float(pings.range_m[k])
-            stray[k] = self._echo.stray * (STRAY_ON if view.is_silent else 1.0)
-            missed[k] = self._missed.odds(which) if range_m <= 0.0 else 0.0
-            self._missed.update(which, range_m)
-            axis_rad = float(pings.axis_rad[k])
-            same = view.move(float(pings.x_m[k]), float(pings.y_m[k]), axis_rad)
-            changed[k] = 1.0 - (1.0 - self._echo.outlier) * same
-            alike[k], blurred[k] = view.densities(range_m, axis_rad, float(stray[k]), self._blur_m)
-            goes_on = (1.0 - changed[k]) * (alike[k] + missed[k]) > changed[k] * anywhere[k]
-            view.update(range_m, axis_rad, float(pings.power[k]), goes_on)
-        either, either_blurred = (
-            changed * (anywhere + missed) ** pings.power + (1.0 - changed) * (like + missed) ** pings.power
-            for like in (alike, blurred)
-        )
-        return UnplannedDensities(stray, missed, alike, np.log(either), np.log(either_blurred), np.ones(len(missed)))
+        anywhere = self._background.of(pings.range_m)
+        rows = remembered_densities(self._memory, pings, anywhere, self._blur_m, self._model)
+        return UnplannedDensities(*rows, np.ones(len(anywhere)))
 
 
 @kernel
-def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: EchoModel, bins: int) -> Floats:
-    """Mean over the poses of the density in the middle of each bin, and of the probability of no echo."""
+def _log_mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: EchoModel, bins: int) -> Floats:
+    """Log of the mean over the poses of the density in the middle of each bin, and of the probability of no echo."""
     block, distance_m, off_axis_rad, kind = one_receiver()
     mean = np.zeros(bins + 1)
     for i in range(len(x)):
@@ -226,7 +99,7 @@ def _mean_density(x: Floats, y: Floats, axis: Floats, walls: WallIndex, model: E
         for k in range(bins):
             mean[k] += echo_density((k + 0.5) * BIN_M, count, distance_m, off_axis_rad, kind, model)
         mean[bins] += echo_density(0.0, count, distance_m, off_axis_rad, kind, model)
-    return mean / len(x)
+    return np.log(mean / len(x))
 
 
 def evidence_share(turn_rad: float) -> float:
@@ -291,7 +164,7 @@ class UsablePings:
         unplanned = self._ranges.densities(pings)
         return PingBatch(
             share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
-            unplanned.stray, unplanned.missed, unplanned.alike, np.exp(unplanned.either),
+            unplanned.stray, unplanned.missed, unplanned.alike, unplanned.density,
         ), unplanned._replace(counts=1.0 - unused_m[used] / travel_m[used])  # fmt: skip
 
     def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> tuple[Floats, Floats]:

@@ -28,15 +28,18 @@ class BeltAngle:
 
     def add(self, t_s: Floats, rate_rad_s: Floats) -> None:
         """A block of samples (n,). A block with a missing sample, or with equal samples only (a dead gyro), is left out."""
-        if not (np.isfinite(t_s).all() and np.isfinite(rate_rad_s).all()) or np.ptp(rate_rad_s) == 0.0:
+        if not np.isfinite([t_s, rate_rad_s]).all() or (rate_rad_s == rate_rad_s[0]).all():
             return
-        times, rates = np.append(self._t_s, t_s), np.append(self._rate, rate_rad_s)
-        if not _unbroken(times):
+        times, rates = t_s, rate_rad_s
+        if goes_on := 0.0 < t_s[0] - self._t_s <= GAP_S:
+            times, rates = np.concatenate([[self._t_s], t_s]), np.concatenate([[self._rate], rate_rad_s])
+        steps_s = times[1:] - times[:-1]
+        is_unbroken = 0.0 < steps_s.min() and steps_s.max() <= GAP_S
+        if not (goes_on and is_unbroken):
             self._begin(float(t_s[0]))
-            times, rates = t_s, rate_rad_s
-        if not _unbroken(times):
+        if not is_unbroken:
             return
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(times) * (rates[1:] + rates[:-1]))])
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * steps_s * (rates[1:] + rates[:-1]))])
         self._kept.append((times, self._angle + turned))
         self._t_s, self._rate, self._angle = float(times[-1]), float(rates[-1]), self._angle + float(turned[-1])
         while self._kept[0][0][-1] < self._t_s - KEPT_S:
@@ -58,9 +61,3 @@ class BeltAngle:
         """Begin an unbroken record at a time."""
         self._kept.clear()
         self.since_s, self._t_s = t_s, math.nan
-
-
-def _unbroken(times: Floats) -> bool:
-    """Whether times (n,) have no gap."""
-    steps = np.diff(times)
-    return bool(((steps > 0.0) & (steps <= GAP_S)).all())

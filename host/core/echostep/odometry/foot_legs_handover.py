@@ -104,7 +104,7 @@ class FootLegsHandover:
 
     def _compare(self, block: GyroBlock, *, foot_stands: bool) -> None:
         """Update the odds that the sensor which stands is not worn; a foot that moves is."""
-        rate = 0.5 * float(abs(block.thigh).mean() + abs(block.calf).mean())
+        rate = float((abs(block.thigh) + abs(block.calf)).sum()) / (2 * len(block.t_s))
         gain = math.log(STANDS_RAD_S / SWINGS_RAD_S) + rate * (1.0 / STANDS_RAD_S - 1.0 / SWINGS_RAD_S)
         gain = gain / ALIKE if rate < math.inf else 0.0  # not a number: no leg gyro
         self._log_odds = max(self._log_odds + gain, NOT_WORN) if foot_stands else NOT_WORN
