@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from echostep.angles import mean_angle
 from echostep.arrays import Floats, Ints
+from echostep.elementary import mean_angle
 from echostep.localization.particles.places import LEAST_PROBABILITY, MOST_PLACES
 from echostep.particles.limits import ROOM_M
 

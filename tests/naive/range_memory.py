@@ -97,6 +97,8 @@ def densities(pings: memory.PlacedPings, log_anywhere: Floats, blur_m: float, m:
         same = (1.0 - m.outlier) * r.share_alike(np.array([x, y, axis]))
         sharp, blurred = (r.density(range_m, stray, blur) for blur in (0.0, blur_m))
         r.update(range_m, power, same * (sharp + odds) > (1.0 - same) * anywhere)
-        either, wide = ((1.0 - same) * (anywhere + odds) ** power + same * (d + odds) ** power for d in (sharp, blurred))
+        either, wide = (
+            (1.0 - same) * (anywhere + odds) ** power + same * (d + odds) ** power for d in (sharp, blurred)
+        )
         rows.append((stray, odds, sharp, either, math.log(either), math.log(wide)))
     return np.array(rows).T

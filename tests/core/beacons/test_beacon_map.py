@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from beacons.beacon_walk import SEED, Walk, beacon_walk, demo, heard, merged
-from echostep.angles import mean_angle
+from echostep.elementary import mean_angle
 from echostep.localization import Start, digest
 from echostep.localization.belief import CloudHypothesis
 from echostep.plan import Pose

@@ -26,8 +26,8 @@ EVERYWHERE = Background(np.full(round(6.0 / BIN_M) + 1, -math.log(6.0)))
 @pytest.mark.parametrize("slant_deg", [-20.0, 0.0, 10.0])
 def test_a_straight_wall_is_foretold(slant_deg: float) -> None:
     normal_rad = 0.5 * math.pi + math.radians(slant_deg)
-    x_m = SPACING_M * np.arange(9)
-    range_m = 1.5 - x_m * math.cos(normal_rad)
+    x_m: Floats = SPACING_M * np.arange(9.0)
+    range_m: Floats = 1.5 - x_m * math.cos(normal_rad)
     memory = new_memory()
     remembered_densities(memory, along(x_m, range_m), np.full(9, -math.log(6.0)), 0.0, echo_model(ECHO))
     assert memory[0, DISTANCE] == pytest.approx(range_m[-1], abs=0.01)
@@ -36,9 +36,14 @@ def test_a_straight_wall_is_foretold(slant_deg: float) -> None:
 
 def test_what_is_remembered_is_as_by_matrices() -> None:
     rng = np.random.default_rng(3)
-    ranger, way_m, axis_rad = rng.integers(0, 2, 300), 0.2 * rng.standard_normal((2, 300)), 0.3 * rng.standard_normal(300)
+    ranger, way_m, axis_rad = (
+        rng.integers(0, 2, 300),
+        0.2 * rng.standard_normal((2, 300)),
+        0.3 * rng.standard_normal(300),
+    )
     range_m = np.where(rng.random(300) < 0.2, 0.0, np.where(rng.random(300) < 0.2, 4.0, 1.5) + 0.05 * way_m[0])
-    pings = PlacedPings(ranger, *way_m.cumsum(axis=1), 0.2 * axis_rad.cumsum() + ranger, range_m, 0.1 + 0.6 * rng.random(300))
+    x_m, y_m = way_m.cumsum(axis=1)
+    pings = PlacedPings(ranger, x_m, y_m, 0.2 * axis_rad.cumsum() + ranger, range_m, 0.1 + 0.6 * rng.random(300))
     args = pings, np.log(0.05 + 0.1 * rng.random(300)), 0.2, echo_model(ECHO)
     assert np.allclose(remembered_densities(new_memory(), *args), range_memory.densities(*args), rtol=1e-6)
 
@@ -51,7 +56,7 @@ def along(x_m: Floats, range_m: Floats) -> PlacedPings:
 
 def densities(range_m: Floats, echo: EchoSettings = ECHO) -> UnplannedDensities:
     """Of echoes of the left ranger every SPACING_M on a way along x."""
-    return RangeMemory(EVERYWHERE, echo).densities(along(SPACING_M * np.arange(len(range_m)), range_m))
+    return RangeMemory(EVERYWHERE, echo).densities(along(np.arange(0.0, len(range_m)) * SPACING_M, range_m))
 
 
 def log_planned(range_m: Floats, true_m: float) -> Floats:

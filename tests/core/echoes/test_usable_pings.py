@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from echostep.echoes.likelihood import EchoSettings, echo_model
-from echostep.echoes.range_memory import HEARD, MISSED, PRIOR_HEARD, PRIOR_MISSED, PlacedPings, new_memory, remembered_densities
+from echostep.echoes.range_memory import (
+    HEARD,
+    MISSED,
+    PRIOR_HEARD,
+    PRIOR_MISSED,
+    PlacedPings,
+    new_memory,
+    remembered_densities,
+)
 from echostep.echoes.unplanned import UsablePings
 from echostep.errors import EchostepError
 from echostep.localization import Building, MapFilter, Start

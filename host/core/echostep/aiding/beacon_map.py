@@ -20,6 +20,7 @@ from echostep.beacons.model import BeaconSettings, beacon_model
 from echostep.beacons.slam import SUSPECT, TIMES_MOVED, BeaconHealth, initial_health, propose_heading_jumps
 from echostep.beacons.step import Beacons, Waiting, no_waiting, update_by_reading
 from echostep.board.gateway import BeaconReading
+from echostep.elementary import cos, dot, sin
 from echostep.localization.particles.cloud import Cloud
 from echostep.localization.particles.particles import Particles
 from echostep.path import PathSegment
@@ -111,7 +112,7 @@ class BeaconMap:
     def _note_unexpected(self, cloud: Cloud, t_s: float) -> None:
         """Note the time for each beacon whose reception is not expected at the cloud's mean place."""
         weight = cloud.weight
-        x, y = float(weight @ cloud.x_m), float(weight @ cloud.y_m)
+        x, y = dot(weight, cloud.x_m), dot(weight, cloud.y_m)
         beacons = moments(_beliefs(cloud), weight)
         index = self._walls.index
         for slot in np.flatnonzero(self._health.known).tolist():
@@ -169,7 +170,7 @@ def _places_at(cloud: Cloud, segment: PathSegment, t_s: float) -> tuple[Floats, 
     """Places x (n,), y (n,) of the particles at a time on the last segment."""
     span_s = segment.t1_s - segment.t0_s
     back = min(max((segment.t1_s - t_s) / span_s, 0.0), 1.0) if span_s > 0.0 else 0.0
-    c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+    c, s = cos(cloud.turn_rad), sin(cloud.turn_rad)
     x = cloud.x_m - back * cloud.scale * (c * segment.dx_m - s * segment.dy_m)
     y = cloud.y_m - back * cloud.scale * (s * segment.dx_m + c * segment.dy_m)
     return x, y

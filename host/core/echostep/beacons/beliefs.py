@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.elementary import product, weighted_covariance
 from echostep.jit import kernel, lean_kernel, lean_part, part
 
 TWO_PI = 2.0 * math.pi
@@ -96,8 +97,8 @@ def correct(
 
 def place_covariance(beliefs: BeaconBeliefs, slot: int, weight: Floats) -> Floats:
     """Covariance (2, 2) of the place of a beacon (m2): mean of the particles' own, and scatter of their means; `weight` (n,) sums to 1."""
-    cov = weight @ beliefs.cov[:, slot][:, [XX, XY, XY, YY]]
-    return cov.reshape(2, 2) + np.cov(beliefs.mean[:, slot, :AXIS], rowvar=False, aweights=weight, bias=True)
+    cov = product(weight, beliefs.cov[:, slot][:, [XX, XY, XY, YY]])
+    return cov.reshape(2, 2) + weighted_covariance(beliefs.mean[:, slot, :AXIS], weight)
 
 
 @kernel

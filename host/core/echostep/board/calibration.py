@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from echostep.arrays import Floats
 from echostep.board.messages import GYROS_INVALID, MOTION_INVALID, PING_TIME_OF_FLIGHT_US_INVALID, Outcome
+from echostep.elementary import exp, log
 
 SPEED_OF_SOUND_M_S = 343.2  # dry air, 20 degC
 ADIS16100_RAD_S = math.radians(0.2439)  # rad/s per count [ADIS16100 datasheet, sensitivity]
@@ -178,4 +179,4 @@ def heights(samples: NDArray[np.void]) -> Floats:
     Only differences over a short time are meaningful, as the weather shifts all heights.
     """
     pressure_pa = np.where(samples["pressure"] == 0, np.nan, PRESSURE_PA * samples["pressure"])
-    return HEIGHT_SCALE_M * (1.0 - (pressure_pa / STANDARD_PA) ** HEIGHT_EXPONENT)
+    return HEIGHT_SCALE_M * (1.0 - exp(HEIGHT_EXPONENT * log(pressure_pa / STANDARD_PA)))

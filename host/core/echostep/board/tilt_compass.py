@@ -20,6 +20,7 @@ from echostep.arrays import Floats, Ints
 from echostep.board.calibration import LSM6DSO_M_S2, ImuSettings
 from echostep.board.frames import Frames
 from echostep.board.messages import MAGNETIC_INVALID, MOTION_INVALID, Magnetic, Motion
+from echostep.elementary import dot
 
 INTERVALS = 20  # of the magnetometer, two seconds: about two strides
 LEVEL = np.array([0.0, 0.0, 1.0])  # vertical without an accelerometer
@@ -29,12 +30,12 @@ _FORCES = [f"belt_acceleration_{axis}" for axis in "xyz"]
 
 def heading_of(field: Floats, vertical: Floats) -> float:
     """Heading of the x axis (rad, counter-clockwise from east) from field (3,) and vertical (3,) in the same axes; NaN if they are parallel."""
-    up = vertical / np.linalg.norm(vertical)
-    north = field - (field @ up) * up
+    up = vertical / math.hypot(*vertical)
+    north = field - dot(field, up) * up
     ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
-    if np.linalg.norm(north) == 0.0 or np.linalg.norm(ahead) == 0.0:
+    if not north.any() or not ahead.any():
         return math.nan
-    return 0.5 * math.pi + math.atan2(float(np.cross(north, ahead) @ up), float(north @ ahead))
+    return 0.5 * math.pi + math.atan2(dot(np.cross(north, ahead), up), dot(north, ahead))
 
 
 class TiltCompass:

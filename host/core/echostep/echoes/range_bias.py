@@ -17,10 +17,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from echostep.angles import mean_angle
 from echostep.arrays import Floats
 from echostep.board.calibration import LEAST_RANGE_M
 from echostep.echoes.likelihood import EchoModel, likeliest_source, normal
+from echostep.elementary import dot, mean_angle
 from echostep.jit import kernel
 from echostep.particles.arrays import Move, ParticleArrays, PingBatch
 from echostep.path import MeasuredSegment
@@ -64,7 +64,11 @@ class RangeBias:
     ) -> None:
         """Learn from corrected pings on a move, at whose end the particles (n,) with these weights are now."""
         rest = 1.0 - pings.share
-        x, y, turn = float(weight @ cloud.x_m), float(weight @ cloud.y_m), mean_angle(cloud.turn_rad, weight)
+        x, y, turn = (
+            dot(weight, cloud.x_m),
+            dot(weight, cloud.y_m),
+            mean_angle(cloud.turn_rad, weight),
+        )
         c, s = math.cos(turn), math.sin(turn)
         place_m = (
             x - rest * (c * move.dx_m - s * move.dy_m),
@@ -72,7 +76,11 @@ class RangeBias:
             pings.axis_rad + turn,
         )
         dx, dy = cloud.x_m - x, cloud.y_m - y
-        covariance_m2 = float(weight @ (dx * dx)), float(weight @ (dx * dy)), float(weight @ (dy * dy))
+        covariance_m2 = (
+            dot(weight, dx * dx),
+            dot(weight, dx * dy),
+            dot(weight, dy * dy),
+        )
         self.learn(pings, place_m, covariance_m2, walls, model)
 
 

@@ -60,7 +60,9 @@ def new_memory() -> Floats:
 
 
 @kernel
-def remembered_densities(memory: Floats, pings: PlacedPings, log_anywhere: Floats, blur_m: float, m: EchoModel) -> Floats:
+def remembered_densities(
+    memory: Floats, pings: PlacedPings, log_anywhere: Floats, blur_m: float, m: EchoModel
+) -> Floats:
     """Rows STRAY to BLURRED of pings (k,), whose densities anywhere in the building have these logs; blurred by a standard deviation.
 
     Changes the memory.

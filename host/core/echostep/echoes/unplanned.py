@@ -86,7 +86,8 @@ class RangeMemory:
         """For pings (k,) in order of time."""
         anywhere = self._background.of(pings.range_m)
         rows = remembered_densities(self._memory, pings, anywhere, self._blur_m, self._model)
-        return UnplannedDensities(*rows, np.ones(len(anywhere)))
+        stray, missed, alike, density, either, blurred = rows
+        return UnplannedDensities(stray, missed, alike, density, either, blurred, np.ones(len(anywhere)))
 
 
 @kernel

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from echostep.elementary import product
 from echostep.foot.steps import Stance, Step, Track
 
 SURE_DEG = 20.0  # error bound of the estimate, assumed; below it the wearer's x-to-toe mounting is trusted
@@ -67,9 +68,9 @@ def rotated_event(event: Step | Stance, toe_rad: float) -> Step | Stance:
     if isinstance(event, Stance) or toe_rad == 0.0:
         return event
     r = _about_z(-toe_rad)
-    x, y, z = (r @ event.move_m).tolist()
+    x, y, z = product(r, np.array(event.move_m)).tolist()
     toe = None if event.toe_rad is None else math.remainder(event.toe_rad - toe_rad, 2.0 * math.pi)
-    return replace(event, move_m=(x, y, z), covariance=r @ event.covariance @ r.T, toe_rad=toe)
+    return replace(event, move_m=(x, y, z), covariance=product(product(r, event.covariance), r.T), toe_rad=toe)
 
 
 def aligned(track: Track) -> Track:
@@ -77,7 +78,7 @@ def aligned(track: Track) -> Track:
     toes = [step.toe_rad for step in track.steps if step.toe_rad is not None]
     if not toes:
         return track
-    position = track.position_m @ _about_z(-toes[-1]).T
+    position = product(track.position_m, _about_z(-toes[-1]).T)
     return replace(
         track, position_m=position, events=[rotated_event(event, toes[-1]) for event in track.events], toe_known=True
     )

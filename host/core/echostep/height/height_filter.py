@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.elementary import dot, product
 from echostep.height.levels import HeightChange
 from echostep.particles.limits import HALF_STOREY_M
 
@@ -99,9 +100,9 @@ class RelativeHeight:
         rise_variance = change.felt_sd_m**2 if felt else CLIMB_M_S**2 * change.span_s
         self._covariance += np.diag([rise_variance, self._drift_m**2 * change.span_s])
         if math.isfinite(change.height_sd_m):
-            covariance = self._covariance @ MEASURED
-            gain = covariance / (MEASURED @ covariance + change.height_sd_m**2)
-            self._state += gain * (change.height_m - MEASURED @ self._state)
+            covariance = product(self._covariance, MEASURED)
+            gain = covariance / (dot(MEASURED, covariance) + change.height_sd_m**2)
+            self._state += gain * (change.height_m - dot(MEASURED, self._state))
             self._covariance -= np.outer(gain, covariance)
             self._covariance = 0.5 * (self._covariance + self._covariance.T)
 

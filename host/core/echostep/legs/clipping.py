@@ -81,11 +81,7 @@ def _reconstruct_peaks(t_s: Floats, rate: Floats, clipped: Bools, limit: float) 
             continue
         m0, m1 = (rate[a] - rate[a - 1]) / before * span, (rate[b + 1] - rate[b]) / after * span
         u = (t_s[begin:end] - t_s[a]) / span
-        cubic = (
-            (2 * u**3 - 3 * u**2 + 1) * rate[a]
-            + (u**3 - 2 * u**2 + u) * m0
-            + (3 * u**2 - 2 * u**3) * rate[b]
-            + (u**3 - u**2) * m1
-        )
+        u2, u3 = u * u, u * u * u
+        cubic = (2 * u3 - 3 * u2 + 1) * rate[a] + (u3 - 2 * u2 + u) * m0 + (3 * u2 - 2 * u3) * rate[b] + (u3 - u2) * m1
         side = np.sign(limit)
         rate[begin:end] = side * np.clip(side * cubic, side * rate[begin:end], HIGHEST * abs(limit))

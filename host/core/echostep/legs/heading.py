@@ -21,6 +21,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
+from echostep.elementary import cos, dot, product, sin
 from echostep.legs.angle_grid import LONGEST_GAP_S
 
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E
@@ -50,7 +51,7 @@ class CompassErrors:
 
     def error(self, heading_rad: float) -> float:
         """Compass heading less true heading."""
-        return float(np.array([self.sin1, self.cos1, self.sin2, self.cos2]) @ harmonics(heading_rad))
+        return dot(np.array([self.sin1, self.cos1, self.sin2, self.cos2]), harmonics(heading_rad))
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +164,7 @@ class Heading:
         dt, self._since_s = self._since_s, 0.0
         f = np.eye(SIZE)
         f[HEADING, BIAS] = -dt
-        self.P = f @ self.P @ f.T
+        self.P = product(product(f, self.P), f.T)
         self.P[HEADING, HEADING] += self.settings.walk_rad**2 * dt
         self.P[BIAS, BIAS] += self.settings.drift_rad_s2**2 * dt
 
@@ -201,7 +202,7 @@ class Heading:
             self._last, self._turned = (t_s, compass), 0.0
             return
         waves = harmonics(heading)
-        innovation = wrap(compass - heading - float(self.state[IRON:] @ waves))
+        innovation = wrap(compass - heading - dot(self.state[IRON:], waves))
         iron = float(np.trace(self.P[IRON:, IRON:]))
         gate = GATE_SD * math.sqrt(self.P[HEADING, HEADING] + iron + self.settings.disturbance_rad**2)
         if not self._steady(t_s, compass) or abs(innovation) > gate:
@@ -226,8 +227,8 @@ class Heading:
 
     def _update(self, row: Floats, innovation: float, variance: float) -> None:
         """Kalman update by a scalar measurement with the measurement row (SIZE,)."""
-        covariance = self.P @ row
-        gain = covariance / (row @ covariance + variance)
+        covariance = product(self.P, row)
+        gain = covariance / (dot(row, covariance) + variance)
         self.state += gain * innovation
         self.P = self.P - np.outer(gain, covariance)
         self.P = 0.5 * (self.P + self.P.T)
@@ -240,4 +241,5 @@ def missing_sd_rad(span_s: float) -> float:
 
 def harmonics(heading_rad: float | Floats) -> Floats:
     """Sines and cosines of the heading and of twice the heading: (4,) or (4, n)."""
-    return np.array([np.sin(heading_rad), np.cos(heading_rad), np.sin(2.0 * heading_rad), np.cos(2.0 * heading_rad)])
+    once = np.asarray(heading_rad, np.float64)
+    return np.array([sin(once), cos(once), sin(2.0 * once), cos(2.0 * once)])

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.elementary import cos, sin
 
 GRAVITY_M_S2 = 9.81
 # Of thigh and shank alike, if not known: adults of both sexes are 1.65 m tall on average [NCD-RisC 2016, world], times 0.245 and 0.246
@@ -86,7 +87,7 @@ class LegLengths:
 
     def ankle_ahead_m(self, thigh: float, shank: float) -> float:
         """Distance (m, not scaled) of the ankle in front of the hip, for angles in rad."""
-        return float(self.thigh_m * np.sin(thigh) + self.to_ankle_m * np.sin(shank))
+        return self.thigh_m * math.sin(thigh) + self.to_ankle_m * math.sin(shank)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +130,8 @@ def travel(
     `rolls`: whether the foot rises about its ball; on stairs it hardly does while it carries. `speed`: relative speed of the walk.
     """
     shank_m = segments.to_ankle_m
-    ankle_ahead = segments.thigh_m * np.sin(thigh) + shank_m * np.sin(shank)
-    above = segments.thigh_m * np.cos(thigh) + shank_m * np.cos(shank)
+    ankle_ahead = segments.thigh_m * sin(thigh) + shank_m * sin(shank)
+    above = segments.thigh_m * cos(thigh) + shank_m * cos(shank)
     pitch = heel_rise(phase, shank, speed) if rolls else np.zeros_like(shank)
     rise_x, rise_z = _about_ball(pitch, shank_m)
     down_x = _about_heel(phase, shank, struck, shank_m) if struck is not None else 0.0
@@ -150,7 +151,7 @@ def heel_rise(phase: Floats, shank: Floats, speed: float = CURVE_SPEED) -> Float
 def _about_ball(pitch: Floats, shank_m: float) -> tuple[Floats, Floats]:
     """Displacement (m) of the ankle forward and up when the foot has turned about the ball by `pitch` (n,)."""
     ahead, high = BALL_AHEAD * shank_m, ANKLE_HEIGHT * shank_m
-    c, s = np.cos(pitch), np.sin(pitch)
+    c, s = cos(pitch), sin(pitch)
     return ahead * (1.0 - c) + high * s, ahead * s - high * (1.0 - c)
 
 
@@ -158,4 +159,4 @@ def _about_heel(phase: Floats, shank: Floats, struck: float, shank_m: float) -> 
     """Forward displacement (m) of the ankle relative to the flat foot; the ankle is neutral at the strike [Perry 1992]."""
     toe_up = max(float(np.interp(struck, phase, shank)), 0.0) * np.clip(1.0 - (phase - struck) / FLAT, 0.0, 1.0)
     high, behind = ANKLE_HEIGHT * shank_m, HEEL_BEHIND * shank_m
-    return -high * np.sin(toe_up) - behind * (1.0 - np.cos(toe_up))
+    return -high * sin(toe_up) - behind * (1.0 - cos(toe_up))

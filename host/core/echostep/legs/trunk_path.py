@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.elementary import cos, sin
 from echostep.legs.clipping import ClippingRepair
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings, missing_sd_rad
 from echostep.legs.kinematics import USUAL_M, LegLengths
@@ -153,8 +154,8 @@ class LegPath:
         within = headings[(times >= t0) & (times <= t1)]
         if not len(within):
             within = np.array([self.heading_rad(0.5 * (t0 + t1))])
-        twist = np.cos(within - within.mean()).mean() if np.ptp(within) < TWIST_RAD else 1.0
-        return float(np.cos(within).mean() / twist), float(np.sin(within).mean() / twist)
+        twist = cos(within - within.mean()).mean() if np.ptp(within) < TWIST_RAD else 1.0
+        return float(cos(within).mean() / twist), float(sin(within).mean() / twist)
 
 
 def segment_after(segment: PathSegment, from_s: float) -> PathSegment:

@@ -12,6 +12,7 @@ from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoModel
 from echostep.echoes.range_table import range_table_of
 from echostep.echoes.unplanned import Background, background
+from echostep.elementary import dot, product
 from echostep.height.levels import UpperLevels
 from echostep.localization.cloud_estimate import Moments
 from echostep.localization.grid.cells import GridCells, grid_cells
@@ -72,7 +73,7 @@ class Building:
 
     def weight_outside(self, x_m: Floats, y_m: Floats, weight: Floats) -> float:
         """Weight of particles (n,) outside of the building; 0 where walls enclose no floor."""
-        return 0.0 if self.indoors is None else float(weight @ ~self.indoors.holds(x_m, y_m))
+        return 0.0 if self.indoors is None else dot(weight, ~self.indoors.holds(x_m, y_m))
 
 
 def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Moments | None:
@@ -80,5 +81,6 @@ def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Moments | None:
     if not len(floor.x_m):
         return None
     x = floor.x_m if sheet is None else floor.x_m - level_of(floor.x_m, sheet) * sheet.pitch_m
-    (xx, xy), (_, yy) = np.cov(x, floor.y_m, bias=True).tolist()
+    away_m = np.array([x - x.mean(), floor.y_m - floor.y_m.mean()])
+    (xx, xy), (_, yy) = (product(away_m, away_m.T) / len(x)).tolist()
     return Moments(float(x.mean()), float(floor.y_m.mean()), xx, xy, yy, 0.0, 0.0)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
+from echostep.elementary import cos, dot, exp, product, sin
 from echostep.localization.estimate import TAIL, Estimate, TrackStatus
 from echostep.localization.particles.particles import Particles
 from echostep.localization.particles.places import LikelyPlace, hypotheses
@@ -40,11 +41,9 @@ class Moments(NamedTuple):
 def moments(cloud: Particles, weight: Floats, walk_heading_rad: float) -> Moments:
     """Moments of a cloud with these weights (n,)."""
     heading_rad = cloud.turn_rad + walk_heading_rad
-    x, y, east, north = (
-        float(weight @ v) for v in (cloud.map_x_m, cloud.y_m, np.cos(heading_rad), np.sin(heading_rad))
-    )
+    x, y, east, north = (dot(weight, v) for v in (cloud.map_x_m, cloud.y_m, cos(heading_rad), sin(heading_rad)))
     dx, dy = cloud.map_x_m - x, cloud.y_m - y
-    xx, xy, yy = (float(weight @ square) for square in (dx * dx, dx * dy, dy * dy))
+    xx, xy, yy = (dot(weight, square) for square in (dx * dx, dx * dy, dy * dy))
     return Moments(x, y, xx, xy, yy, east, north)
 
 
@@ -55,14 +54,14 @@ def weight_about(cloud: Particles, at: Moments | Pose, z_m: float, map_sd_m: flo
     rest of the limit: a lower bound for the sum of both errors.
     """
     here = cloud.weight * (np.abs(cloud.z_m - z_m) < HALF_STOREY_M)
-    near, about = (float(here @ _within(limit - _away_m(cloud, at), map_sd_m)) for limit in (TRACKING_M, LOST_M))
+    near, about = (dot(here, _within(limit - _away_m(cloud, at), map_sd_m)) for limit in (TRACKING_M, LOST_M))
     return near, about
 
 
 def _within(left_m: Floats, sd_m: float) -> Floats:
     """Probability (n,) that a place in two dimensions is off by less than `left_m`."""
     certain = np.asarray(left_m > 0.0, np.float64)
-    return certain if sd_m <= 0.0 else certain * -np.expm1(-0.5 * (left_m / sd_m) ** 2)
+    return certain if sd_m <= 0.0 else certain * (1.0 - exp(-0.5 * (left_m / sd_m) ** 2))
 
 
 # The tracked cloud and its rivals, each with the probability that the trunk is in it
@@ -86,9 +85,9 @@ def estimate_of(
     (cloud, right), *rivals = mixture
     weight, shares = cloud.weight, np.array([probability for _, probability in mixture])
     shares = shares / shares.sum() if shares.any() else np.full(len(mixture), 1.0 / len(mixture))
-    levels = tuple((on_level * shares @ np.array([each.level_shares for each, _ in mixture])).tolist())
-    z = float(weight @ cloud.z_m)
-    height = height or (z, math.sqrt(float(weight @ (cloud.z_m - z) ** 2)))
+    levels = tuple((on_level * product(shares, np.array([each.level_shares for each, _ in mixture]))).tolist())
+    z = dot(weight, cloud.z_m)
+    height = height or (z, math.sqrt(dot(weight, (cloud.z_m - z) ** 2)))
     m = region = moments(cloud, weight, walk_heading_rad)
     places: tuple[LikelyPlace, ...] = ()
     if rivals or m.xx_m2 + m.yy_m2 > SPREAD_M**2 or max(levels) < BELIEVED or right <= SURE:
@@ -99,7 +98,7 @@ def estimate_of(
     x, y, xx, xy, yy, east, north = m
     spread = math.sqrt(max(-2.0 * math.log(min(math.hypot(east, north), 1.0)), 0.0))
     away_m = _away_m(cloud, m)
-    near, about = (right * float(weight @ _within(limit - away_m, map_sd_m)) for limit in (TRACKING_M, LOST_M))
+    near, about = (right * dot(weight, _within(limit - away_m, map_sd_m)) for limit in (TRACKING_M, LOST_M))
     for each, probability in rivals:
         beside = weight_about(each, m, z, map_sd_m)
         near, about = near + probability * beside[0], about + probability * beside[1]
@@ -143,7 +142,7 @@ def _at_likeliest(
     if right * share > SURE:
         region = moments(cloud, inside / share, walk_heading_rad)
         return _about(mean, region, (region.east, region.north)), region, share
-    near, near_mean = (float(cloud.weight @ (_away_m(cloud, at) < TRACKING_M)) for at in (place, mean))
+    near, near_mean = (dot(cloud.weight, _away_m(cloud, at) < TRACKING_M) for at in (place, mean))
     if near < MUCH_LIKELIER * near_mean:
         return mean, mean, 1.0
     length = math.hypot(mean.east, mean.north)

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from echostep.angles import mean_angle
 from echostep.echoes.likelihood import EchoSettings
 from echostep.echoes.range_bias import RangeBias
 from echostep.echoes.unplanned import RangeMemory, UnplannedDensities, UsablePings, evidence_share
+from echostep.elementary import dot, mean_angle
 from echostep.height.height_filter import RelativeHeight, RidingHeight
 from echostep.height.levels import Air, HeightChange
 from echostep.localization.belief import PLAN_FITS, WRONG_PER_M, Belief, CloudHypothesis, CrossedWalls
@@ -248,7 +248,7 @@ class MapFilter:
         if each.table is not None:
             each.weigh(share * each.table.advance(move, pings, self._model), evidence.log_path)
         elif self.building.has_walls:
-            log_ratio, log_passed = float(unplanned.counts @ (evidence.log_pings - alone)), evidence.log_path
+            log_ratio, log_passed = dot(unplanned.counts, evidence.log_pings - alone), evidence.log_path
             if self.belief.search is None:
                 path_m = math.hypot(move.dx_m, move.dy_m)
                 log_passed = self._crossed.charge(self._believed(0.0), path_m, log_passed)
@@ -273,7 +273,7 @@ class MapFilter:
         if self.belief.search is None or self.belief.search.cloud.is_searching:
             return False
         cloud, mean = self.belief.search.cloud.particles, self._believed(0.0)
-        return weight_about(cloud, mean, float(self.cloud.weight @ self.cloud.z_m))[0] > PROBABLE
+        return weight_about(cloud, mean, dot(self.cloud.weight, self.cloud.z_m))[0] > PROBABLE
 
     def _level_m(self) -> float:
         """Height of the tracked cloud in the plan (m) by the level that is believed, NaN: none is."""
@@ -281,7 +281,7 @@ class MapFilter:
         if tracked.sheet is None:
             return 0.0 if self.building.has_walls else math.nan
         is_known = not tracked.is_searching and self.cloud.level_shares.max() > BELIEVED
-        return float(self.cloud.weight @ self.cloud.z_m) if is_known else math.nan
+        return dot(self.cloud.weight, self.cloud.z_m) if is_known else math.nan
 
     def _believed(self, walk_heading_rad: float) -> Pose:
         """The mean pose of the tracked cloud, on its likeliest level."""

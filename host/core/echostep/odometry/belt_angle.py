@@ -34,7 +34,7 @@ class BeltAngle:
         if goes_on := 0.0 < t_s[0] - self._t_s <= GAP_S:
             times, rates = np.concatenate([[self._t_s], t_s]), np.concatenate([[self._rate], rate_rad_s])
         steps_s = times[1:] - times[:-1]
-        is_unbroken = 0.0 < steps_s.min() and steps_s.max() <= GAP_S
+        is_unbroken = steps_s.min() > 0.0 and steps_s.max() <= GAP_S
         if not (goes_on and is_unbroken):
             self._begin(float(t_s[0]))
         if not is_unbroken:

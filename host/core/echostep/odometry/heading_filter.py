@@ -15,6 +15,7 @@ import numpy as np
 
 from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import dot, product
 from echostep.legs.heading import HeadingSettings
 from echostep.path import StanceHeadings
 
@@ -66,8 +67,8 @@ class HeadingFilter:
         f = np.eye(SIZE)
         f[FOOT, FOOT], f[OFFSET, FOOT] = kept, 1.0 - kept
         f[OFFSET, BIAS], f[OFFSET, SCALE] = -dt, -turn
-        self.state = f @ self.state
-        self.P = f @ self.P @ f.T
+        self.state = product(f, self.state)
+        self.P = product(product(f, self.P), f.T)
         self.P[FOOT, FOOT] += stance.growth_rad2
         self.P[OFFSET, OFFSET] += GYRO.walk_rad**2 * dt + (stance.bias_sd_rad_s * dt) ** 2
         self.P[BIAS, BIAS] += GYRO.drift_rad_s2**2 * dt
@@ -76,9 +77,9 @@ class HeadingFilter:
 
     def update(self, stance: StanceHeadings) -> bool:
         """Update by the measured difference; False if the innovation is beyond the gate."""
-        innovation = wrap(stance.foot_rad - stance.belt_rad - float(MEASURED @ self.state))
-        towards = self.P @ MEASURED
-        variance = float(MEASURED @ towards) + JITTER_RAD**2 + (TWIST_SHARE * self._turn_rad) ** 2
+        innovation = wrap(stance.foot_rad - stance.belt_rad - dot(MEASURED, self.state))
+        towards = product(self.P, MEASURED)
+        variance = dot(MEASURED, towards) + JITTER_RAD**2 + (TWIST_SHARE * self._turn_rad) ** 2
         square = innovation**2 / variance
         self._mean_square += (min(square, GATE_SD**2) - self._mean_square) / MEMORY
         if square > GATE_SD**2:

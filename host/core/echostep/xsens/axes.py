@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Bools, Floats
+from echostep.elementary import cos, sin
 
 ENU, NED, NWU = 0x0, 0x4, 0x8  # coordinate bits of an MTData2 identifier [LLCP, MTData2]
 EULER_LIMITS = np.array([180.01, 90.01, 180.01])  # degrees of roll, pitch, yaw: the range and some rounding
@@ -58,8 +59,8 @@ def from_euler(degrees: Floats) -> Floats:
     """
     possible = np.all(np.abs(degrees) <= EULER_LIMITS, axis=1)
     half = np.radians(np.where(possible[:, None], degrees, 0.0)) * 0.5
-    cr, cp, cy = np.cos(half).T
-    sr, sp, sy = np.sin(half).T
+    cr, cp, cy = cos(half).T
+    sr, sp, sy = sin(half).T
     return possible[:, None] * np.stack(
         [
             cr * cp * cy + sr * sp * sy,

@@ -27,6 +27,7 @@ import numpy as np
 
 from echostep.aiding.team.meeting import RANGE_BODY_SD_M, WRONG, Meeting, covariance
 from echostep.arrays import Bools, Floats
+from echostep.elementary import cos, determinant, dot, exp, inverse, log, product, sin, weighted_covariance
 from echostep.localization.belief import CloudHypothesis
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.cloud import Cloud
@@ -45,14 +46,14 @@ def log_density(meeting: Meeting, place: Floats, on_level: Bools, levels: int) -
     """Log of the density (n,) of a right meeting for a wearer at `place` (n, 2): per m2 after a tap, per metre by radio."""
     away, spread = place - [meeting.x_m, meeting.y_m], covariance(meeting)
     other = (1.0 - meeting.level_probability) / max(levels - 1, 1)
-    log_level = np.log(np.maximum(np.where(on_level, meeting.level_probability, other), 1e-12))
+    log_level = log(np.maximum(np.where(on_level, meeting.level_probability, other), 1e-12))
     if meeting.range_m is None:
-        square = np.einsum("ni,ij,nj->n", away, np.linalg.inv(spread), away)
-        log_normal = -0.5 * square - math.log(2.0 * math.pi) - 0.5 * math.log(np.linalg.det(spread))
+        square = np.einsum("ni,ij,nj->n", away, inverse(spread), away)
+        log_normal = -0.5 * square - math.log(2.0 * math.pi) - 0.5 * math.log(determinant(spread))
     else:
         distance = np.hypot(away[:, 0], away[:, 1])
         variance = _range_variance(meeting, away, spread)
-        log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * np.log(2.0 * math.pi * variance)
+        log_normal = -0.5 * (meeting.range_m - distance) ** 2 / variance - 0.5 * log(2.0 * math.pi * variance)
     return log_normal + log_level
 
 
@@ -60,7 +61,7 @@ def information(meeting: Meeting, mean: Floats) -> Floats:
     """Inverse covariance (2, 2) of the wearer's place by the meeting; for a radio range only along the line from the teammate to `mean` (2,)."""
     spread = covariance(meeting)
     if meeting.range_m is None:
-        return np.asarray(np.linalg.inv(spread), np.float64)
+        return inverse(spread)
     away = (mean - [meeting.x_m, meeting.y_m])[None]
     along = _along(away)[0]
     return np.outer(along, along) / _range_variance(meeting, away, spread)[0]
@@ -68,7 +69,7 @@ def information(meeting: Meeting, mean: Floats) -> Floats:
 
 def best_omega(own: Floats, other: Floats) -> float:
     """The weight omega of the cloud's information (2, 2) that minimises the fused determinant: det(omega A + (1 - omega) B) is a parabola."""
-    a, b = float(np.linalg.det(own)), float(np.linalg.det(other))
+    a, b = determinant(own), determinant(other)
     c = float(own[0, 0] * other[1, 1] + own[1, 1] * other[0, 0] - own[0, 1] * other[1, 0] - own[1, 0] * other[0, 1])
     curvature = a - c + b
     if curvature >= 0.0:
@@ -78,7 +79,7 @@ def best_omega(own: Floats, other: Floats) -> float:
 
 def places_at(cloud: Particles, meeting: Meeting) -> Floats:
     """Places (n, 2) of the particles at the meeting, map frame."""
-    c, s = np.cos(cloud.turn_rad), np.sin(cloud.turn_rad)
+    c, s = cos(cloud.turn_rad), sin(cloud.turn_rad)
     x, y = meeting.way_x_m, meeting.way_y_m
     way = cloud.scale[:, None] * np.column_stack([c * x - s * y, s * x + c * y])
     return np.column_stack([cloud.map_x_m, cloud.y_m]) + way
@@ -96,7 +97,7 @@ def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     log_met, weight = log_density(meeting, place, on_level, levels), particles.weight
     wrong = WRONG[meeting.status]
     anywhere = 1.0 / (area_m2 if meeting.range_m is None else math.sqrt(area_m2))
-    density = (1.0 - wrong) * float(weight @ np.exp(log_met))
+    density = (1.0 - wrong) * dot(weight, exp(log_met))
     right = density / (density + wrong * anywhere)
     factor = log_met if cloud.is_searching else None
     if right >= PROBABLE and not cloud.is_searching:
@@ -104,17 +105,17 @@ def weigh(cloud: Cloud | Search, meeting: Meeting, area_m2: float) -> float:
     if factor is not None:  # a cloud that is concentrated elsewhere is not changed
         factor = meeting.share * factor
         factor -= factor.max()
-        factor -= math.log(float(weight @ np.exp(factor)))
+        factor -= math.log(dot(weight, exp(factor)))
         # Right or wrong, in these shares: a mixture of the reweighted cloud and the old one.
-        cloud.reweight(np.log(np.maximum(right * np.exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
+        cloud.reweight(log(np.maximum(right * exp(factor) + 1.0 - right, math.exp(LEAST_FACTOR))))
     return right
 
 
 def _intersection(meeting: Meeting, place: Floats, weight: Floats, log_met: Floats) -> Floats | None:
     """Log-factors (n,) of covariance intersection for particles at `place` (n, 2); None where the cloud has more information in every direction."""
-    mean = weight @ place
-    spread = np.cov(place, rowvar=False, aweights=weight, bias=True) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
-    own: Floats = np.asarray(np.linalg.inv(spread), np.float64)
+    mean = product(weight, place)
+    spread = weighted_covariance(place, weight) + LEAST_SD_OF_CLOUD_M**2 * np.eye(2)
+    own = inverse(spread)
     omega = best_omega(own, information(meeting, mean))
     if omega >= 1.0:
         return None

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.elementary import exp
 from echostep.height.levels import (
     UNKNOWN_LAG_M2,
     ClimbSettings,
@@ -64,7 +65,7 @@ class GridHeights:
             innovation_m = change.height_m - sheet.height_m - lag_m
             lag_m += np.where(innovation_m**2 < THREE_SD2 * variance, gain * innovation_m, 0.0)
         self._lag_m = lag_m
-        factors = LevelFactors(np.exp(cost.min() - cost).astype(np.float32), east, -float(cost.min()))
+        factors = LevelFactors(exp(cost.min() - cost).astype(np.float32), east, -float(cost.min()))
         return factors, (1.0 - gain) * lag_variance
 
     def of(self, level: Ints, connector: Ints) -> tuple[Floats, Floats]:

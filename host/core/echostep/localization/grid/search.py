@@ -17,8 +17,10 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.echoes.likelihood import EchoModel
+from echostep.echoes.range_memory import PlacedPings
 from echostep.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePing, TablePings, log_densities
-from echostep.echoes.unplanned import PlacedPings, RangeMemory
+from echostep.echoes.unplanned import RangeMemory
+from echostep.elementary import exp, log
 from echostep.height.levels import HeightChange
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.heights import GridHeights
@@ -150,7 +152,7 @@ class Search(PressureLag):
         c, d = math.cos(self._turned_rad), math.sin(self._turned_rad)
         east, north = c * piece.dx_m - d * piece.dy_m, d * piece.dx_m + c * piece.dy_m
         log_top = float(log_factor.max())
-        factor = np.exp(log_factor - log_top - math.log(self._top)).astype(np.float32)
+        factor = exp(log_factor - log_top - math.log(self._top)).astype(np.float32)
         kept, top, before, after = shift_and_weigh(
             s, east, north, factor, axis_rad + self._turned_rad, self._least, WALL_SHARE, self._cells
         )
@@ -238,7 +240,7 @@ class Search(PressureLag):
     @property
     def states(self) -> Particles:
         """All states, each in the middle of its cell and sector."""
-        log_weight: Floats = np.log(np.maximum(self._states.weight, np.finfo(np.float32).tiny).astype(np.float64))
+        log_weight = log(np.maximum(self._states.weight, np.finfo(np.float32).tiny).astype(np.float64))
         return self._particles(np.arange(len(self)), log_weight - log_weight.max())
 
     @property
@@ -253,7 +255,7 @@ class Search(PressureLag):
 
     def reweight(self, log_factor: Floats) -> None:
         """Multiply the weights of all states by factors, given as logarithms (n,)."""
-        self._weigh_anew(self._states.weight * np.exp(log_factor - log_factor.max()))
+        self._weigh_anew(self._states.weight * exp(log_factor - log_factor.max()))
 
     def _poses(self, chosen: Ints) -> DrawnPoses:
         """The middles of states (n,)."""

@@ -14,6 +14,7 @@ from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.echoes.range_table import SECTORS
 from echostep.echoes.unplanned import RangeMemory
+from echostep.elementary import exp
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.particles import Particles
@@ -64,11 +65,11 @@ def _near(floor: Floor, pose: Pose, sd_m: float, sheet: LevelSheet | None) -> Fl
     map_x_m = floor.x_m - (0.0 if sheet is None else level * sheet.pitch_m)
     away2 = (map_x_m - pose.x_m) ** 2 + (floor.y_m - pose.y_m) ** 2
     on = (level == pose.level) | (pose.level == ANY_LEVEL) if sheet is not None else np.ones(len(level), np.bool_)
-    return np.asarray(on * np.exp(-0.5 * away2 / (sd_m**2 + CELL_M**2)))
+    return np.asarray(on * exp(-0.5 * away2 / (sd_m**2 + CELL_M**2)))
 
 
 def _facing(turn_rad: float, sd_rad: float) -> Floats:
     """Density in the sectors of the rotation walk -> map (SECTORS,) about one of them; even above TURN_AROUND_RAD."""
     sector_rad = 2.0 * math.pi / SECTORS
     off_rad: Floats = wrap(np.asarray((np.arange(SECTORS) + 0.5) * sector_rad - turn_rad))
-    return np.ones(SECTORS) if sd_rad > TURN_AROUND_RAD else np.exp(-0.5 * off_rad**2 / (sd_rad**2 + sector_rad**2))
+    return np.ones(SECTORS) if sd_rad > TURN_AROUND_RAD else exp(-0.5 * off_rad**2 / (sd_rad**2 + sector_rad**2))

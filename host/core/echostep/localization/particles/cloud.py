@@ -22,6 +22,7 @@ import numpy as np
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoModel
 from echostep.echoes.reweighting import CloudModel, MoveProgress, propagate_and_reweight
+from echostep.elementary import cos, exp, sin
 from echostep.height.levels import (
     ClimbSettings,
     HeightArrays,
@@ -180,7 +181,7 @@ class Cloud(Particles):
         self.keep(chosen)
         self.log_weight = log_weight[chosen]
         self._roughen(*PASSING_ROUGH)
-        c, s = self.scale * np.cos(self.turn_rad), self.scale * np.sin(self.turn_rad)
+        c, s = self.scale * cos(self.turn_rad), self.scale * sin(self.turn_rad)
         self.x_m, self.y_m = self.x_m - (c * dx_m - s * dy_m), self.y_m - (s * dx_m + c * dy_m)
         self.hidden = np.zeros((2, len(self.x_m)))
         if self.sheet:
@@ -202,11 +203,11 @@ class Cloud(Particles):
 
     def scatter(self, move: Move, change: HeightChange | None = None) -> None:
         """Spread by an unobserved move. The level follows the height by pressure, if any."""
-        self.keep(systematic(np.exp(self.log_weight), float(self._rng.random()), self._settings.largest))
+        self.keep(systematic(exp(self.log_weight), float(self._rng.random()), self._settings.largest))
         self.is_gathered = False
         noise = self._rng.standard_normal((3, len(self.x_m)))
         self.turn_rad += move.turn_sd_rad * noise[2]
-        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        c, s = cos(self.turn_rad), sin(self.turn_rad)
         self.x_m = self.x_m + c * move.dx_m - s * move.dy_m + move.sd_m * noise[0]
         self.y_m = self.y_m + s * move.dx_m + c * move.dy_m + move.sd_m * noise[1]
         if self.sheet and change and math.isfinite(change.height_sd_m):
@@ -230,7 +231,7 @@ class Cloud(Particles):
             else 0.5 * log_mode_weight(self.x_m, self.y_m, self.turn_rad, self.weight)
         )
         wanted_weight = self.log_weight - weight_after
-        if effective_size(np.exp(wanted_weight)) >= self._settings.resample_below * len(self.x_m):
+        if effective_size(exp(wanted_weight)) >= self._settings.resample_below * len(self.x_m):
             return
         self._resample(wanted_weight, weight_after, len(self.x_m))
         count = min(self._wanted_size(), self._settings.largest)
@@ -242,7 +243,7 @@ class Cloud(Particles):
 
     def _resample(self, log_wanted: Floats, log_weight: Floats, count: int) -> None:
         """Keep `count` particles with these log-probabilities (n,), each with its log-weight (n,)."""
-        chosen = systematic(np.exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
+        chosen = systematic(exp(log_wanted - log_wanted.max()), float(self._rng.random()), count)
         log_chosen = log_weight[chosen]
         self.keep(chosen)
         self.log_weight = log_chosen - log_chosen.max()

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from echostep.arrays import Floats, Ints
+from echostep.elementary import dot, exp, log, product
 from echostep.height.levels import UNKNOWN_LAG_M2, Air, ClimbSettings, HeightChange, drift_m
 from echostep.localization.particles.places import hypotheses
 from echostep.localization.settings import CloudSettings
@@ -71,8 +72,8 @@ class Particles(PressureLag):
         if self.sheet is None or self.lag_variance >= UNKNOWN_LAG_M2:
             return None
         weight = self.weight
-        mean = float(weight @ self.lag_m)
-        return Air(mean, math.sqrt(self.lag_variance + float(weight @ (self.lag_m - mean) ** 2)))
+        mean = dot(weight, self.lag_m)
+        return Air(mean, math.sqrt(self.lag_variance + dot(weight, (self.lag_m - mean) ** 2)))
 
     def turn_walk_frame(self, by_rad: float) -> None:
         """Rotate all particles: the heading in the walk frame has changed while the wearer's heading on the map has not."""
@@ -101,14 +102,14 @@ class Particles(PressureLag):
     @property
     def weight(self) -> Floats:
         """Weights (n,) that sum to 1."""
-        weight: Floats = np.exp(self.log_weight)
+        weight = exp(self.log_weight)
         weight /= weight.sum()
         return weight
 
     @property
     def hidden_share(self) -> float:
         """Probability that the view of a ranger is hidden, mean of both."""
-        return float((self.hidden @ self.weight).mean())
+        return float(product(self.hidden, self.weight).mean())
 
     @property
     def place_share(self) -> float:
@@ -126,8 +127,8 @@ class Particles(PressureLag):
     def far_weight(self, x_m: Floats) -> float:
         """Weight further than ROOM_M from the mean, by x (n,) on the sheet or in the map."""
         weight = self.weight
-        far = np.hypot(x_m - weight @ x_m, self.y_m - weight @ self.y_m) > ROOM_M
-        return float(weight @ far)
+        far = np.hypot(x_m - dot(weight, x_m), self.y_m - dot(weight, self.y_m)) > ROOM_M
+        return dot(weight, far)
 
     def keep(self, chosen: Ints) -> None:
         """Replace the particles by the chosen ones (m,), with equal weights."""
@@ -149,7 +150,7 @@ def log_mode_weight(x_m: Floats, y_m: Floats, turn_rad: Floats, weight: Floats) 
         return np.zeros(len(x_m))
     cell = (east.astype(np.int64) * rows + north.astype(np.int64)) * sectors + sector
     mass = np.bincount(cell, weight)
-    return np.log(np.maximum(mass, LEAST_MODE))[cell]
+    return log(np.maximum(mass, LEAST_MODE))[cell]
 
 
 def kld_size(x_m: Floats, y_m: Floats, turn_rad: Floats, settings: CloudSettings) -> int:
