@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.echoes import range_memory as memory
 from echostep.echoes.likelihood import STRAY_ON, EchoModel, detection
+from echostep.elementary import wrap
 from echostep.walls.tile_points import WALL
 
 

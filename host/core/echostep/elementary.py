@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Elementary functions and products with the same bits on every processor of a kind.
+"""Angles, elementary functions and products, with the same bits on every processor of a kind.
 
 In: arrays. Out: arrays. Owns nothing.
 
@@ -10,13 +10,20 @@ and the processor that this finds; an estimate shall not.
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
 from echostep.arrays import Bools, Floats
 from echostep.jit import kernel
 
+Angle = TypeVar("Angle", float, Floats)
 _EXP, _LOG, _SIN, _COS = range(4)
+
+
+def wrap(angle_rad: Angle) -> Angle:
+    """The same angle, or angles, in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def exp(x: Floats) -> Floats:

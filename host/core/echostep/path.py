@@ -12,8 +12,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
+from echostep.elementary import wrap
 
 # Share of an arc that the way in a turn follows. The simulated wearers walk whole arcs; in the one available turn with motion capture, on the spot,
 # the pelvis went 0 to 0.4 of it [Sy 2020]

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 from echostep.path import MeasuredSegment, PathSegment
 from echostep_app.mapping.graph.nodes import HELD_TURN_SD_RAD, TURN_SD_RAD, nodes_of
 from echostep_app.mapping.smoothed_heading import with_smoothed_headings

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep.legs.heading import CompassErrors, Heading, HeadingSettings
 
 IRON = CompassErrors(math.radians(6), math.radians(-4), math.radians(2), math.radians(1))

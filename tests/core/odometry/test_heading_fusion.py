@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 from echostep.foot.steps import Stance, Step
 from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry.heading_fusion import HeadingFusion

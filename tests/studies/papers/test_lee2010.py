@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep_studies.papers import lee2010
 from echostep_studies.papers.lee2010 import Lee2010Legs
 

@@ -14,7 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
 from echostep_app.guidance.contact import CONTACT, allowed_silence, start_contact, update_contact

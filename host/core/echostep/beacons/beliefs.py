@@ -70,7 +70,7 @@ def place_beacon(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_
 
 @lean_kernel
 def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi), for kernels. It rounds differently from `angles.wrap`, and results depend on the last bit."""
+    """The same angle in [-pi, pi), for kernels. It rounds differently from `elementary.wrap`, and results depend on the last bit."""
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 

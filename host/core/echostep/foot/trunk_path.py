@@ -17,8 +17,8 @@ from statistics import median
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 from echostep.foot.steps import Stance, Step
 from echostep.foot.zupt_ins import GAP_S
 from echostep.path import STANDING_PIECE_S, PathSegment

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
-from echostep.elementary import cos, dot, product, sin
+from echostep.elementary import cos, dot, product, sin, wrap
 from echostep.legs.angle_grid import LONGEST_GAP_S
 
 HEADING, BIAS, IRON = 0, 1, 2  # indices of the state; from IRON on: B, C, D, E

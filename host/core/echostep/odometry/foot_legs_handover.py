@@ -20,7 +20,7 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep.legs.heading import CompassErrors
 from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated_segment, segment_after
 from echostep.path import UNOBSERVED_SD_M, PathSegment

@@ -13,9 +13,8 @@ import math
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
-from echostep.elementary import dot, product
+from echostep.elementary import dot, product, wrap
 from echostep.legs.heading import HeadingSettings
 from echostep.path import StanceHeadings
 

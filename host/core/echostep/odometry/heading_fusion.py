@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep.foot.alignment import rotated_event
 from echostep.foot.steps import Stance, Step
 from echostep.legs.trunk_path import GyroBlock

@@ -26,10 +26,10 @@ from echostep.aiding import (
     shared_beacons,
     start_at,
 )
-from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.board.gateway import BeaconReading, Gateway
 from echostep.echoes.rangers import echo_of
+from echostep.elementary import wrap
 from echostep.errors import EchostepError
 from echostep.localization import Building, Estimate, FilterSettings, Start, TrackStatus
 from echostep.odometry import FrontEnd, WearerWatch

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Bools, Floats
+from echostep.elementary import wrap
 from echostep_simulation.people.attitude import rotations
 from echostep_simulation.people.foot_path import FootPath, Strides, foot_path
 from echostep_simulation.people.leg_angles import STRAIGHT, LegDimensions, hip_path, leg_angles, stair_angles, sway

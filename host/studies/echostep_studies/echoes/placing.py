@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
 from echostep.echoes.likelihood import EchoModel
+from echostep.elementary import wrap
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.sweeps import Sweep

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoSettings, echo_model
+from echostep.elementary import wrap
 from echostep.walls.echo_sources import Walls
 from echostep_studies.echoes.known_pings import KnownPings, known_pings, log_densities
 from echostep_studies.echoes.placing import grid_table, place

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 from echostep.path import MeasuredSegment
 from echostep_simulation.world.acoustics import SRF02
 from echostep_simulation.world.echoes import ranger_bias_m

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 
 THIGH_M, CALF_M = 0.48, 0.56  # L1, L2 [Lee 2010, section 2]
 RATE_HZ = 10.0  # of eqs. 19 and 20 [Lee 2010, section 3]

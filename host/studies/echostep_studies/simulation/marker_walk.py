@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Bools, Floats, Ints
 from echostep.board.messages import Schedule
+from echostep.elementary import wrap
 from echostep_simulation.devices.srf02 import FIRST_US, HALF_US, JITTER_US, LAST_US
 from echostep_simulation.world.acoustics import SRF02, Acoustics
 from echostep_simulation.world.echoes import echoes, ranger_bias_m

@@ -15,8 +15,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
-from echostep.angles import wrap
 from echostep.arrays import Floats, Ints
+from echostep.elementary import wrap
 from echostep_app.mapping.graph.directions import ALIGNED, DIRECTION_SD_RAD, RIGHT_RAD
 from echostep_app.mapping.graph.fragments import Fragments
 from echostep_app.mapping.graph.levels import WalkLevels

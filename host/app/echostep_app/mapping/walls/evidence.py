@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Bools, Floats, Ints
+from echostep.elementary import wrap
 from echostep.jit import kernel
 from echostep_app.mapping.graph.graph import Graph
 from echostep_app.mapping.graph.nodes import Pings

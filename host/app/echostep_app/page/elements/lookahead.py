@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from echostep.angles import wrap
+from echostep.elementary import wrap
 from echostep.localization import Estimate, TrackStatus
 from echostep.particles.ellipse import ellipse95
 from echostep.path import PathSegment

@@ -10,11 +10,10 @@ import math
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
 from echostep.echoes.range_table import SECTORS
 from echostep.echoes.unplanned import RangeMemory
-from echostep.elementary import exp
+from echostep.elementary import exp, wrap
 from echostep.localization.grid.cells import GridCells
 from echostep.localization.grid.search import Search
 from echostep.localization.particles.particles import Particles

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from echostep.angles import wrap
 from echostep.arrays import Floats
+from echostep.elementary import wrap
 from echostep_studies.bench.laser.carmen_log import CarmenLog
 
 FITS_RAD = math.radians(10.0)  # error of a turn between two scans above which the odometry's times do not fit the scans
