@@ -44,6 +44,13 @@ def test_the_position_is_that_of_the_likelier_place(second: float, x_m: float, h
     assert found.status == TrackStatus.UNCERTAIN
 
 
+def test_headings_that_cancel_have_no_direction() -> None:
+    """As of a search in a building that is its own half turn."""
+    cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0)), 0.0, np.random.default_rng(1))
+    cloud.turn_rad = np.resize([0.0, 0.0, math.pi, -math.pi], len(cloud.x_m))
+    assert estimate_of([(cloud, 1.0)], 0.0, 0.0, 0).heading_sd_rad > math.pi
+
+
 def test_no_place_that_has_half_of_the_weight_is_the_position() -> None:
     """Three places alike: the mean is as good as any of them."""
     cloud = cloud_about(CloudSettings(), Start(Pose(0.0, 0.0, 0.0), 0.1), 0.0, np.random.default_rng(1))

@@ -18,6 +18,7 @@ from echostep.plan import Plan, Pose
 LONG_M = 2.5  # a wall that can be missing is at least so long
 NEAR_M = 2.0  # and so near to the way
 ADDED_M = 2.0  # length of a wall that is only on the plan
+APART_M = 1.0  # of a building and its half turn, from the middle between both
 ADDED_AFTER = (0.2, 0.5)  # share of the way at which it stands across
 
 
@@ -41,6 +42,13 @@ def wall_missing(plan: Plan, way: Floats, rng: np.random.Generator) -> Plan:
     if not candidates:
         raise EchostepError(f"plan {plan.name}: no wall of {LONG_M} m stands beside the way")
     return _with_walls(plan, np.delete(walls, rng.choice(candidates), axis=0))
+
+
+def beside_half_turn(plan: Plan, way: Floats, rng: np.random.Generator) -> Plan:
+    """The plan, and beside it its half turn, without one of the long walls beside the way (n, 2): two places differ by that alone."""
+    walls, other = plan.levels[0].walls, wall_missing(plan, way, rng).levels[0].walls
+    x_m, y_m = float(walls[:, ::2].max()) + APART_M, 0.5 * float(walls[:, 1::2].min() + walls[:, 1::2].max())
+    return _with_walls(plan, np.vstack([walls, 2.0 * np.array([x_m, y_m, x_m, y_m]) - other]))
 
 
 def wall_added(plan: Plan, way: Floats, rng: np.random.Generator) -> Plan:

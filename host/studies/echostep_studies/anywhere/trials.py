@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -182,6 +182,7 @@ TRIALS: dict[str, Callable[[Walks], Trial]] = {
     "start/wide": lambda w: _wide(w.office),
     "start/unknown-office": lambda w: _from_anywhere(w.office),
     "start/unknown-3-floors": lambda w: _from_anywhere(w.floors),
+    "start/unknown-half-turn": lambda w: replace(_on_other_plan(w, plan_changes.beside_half_turn, 8), start=Start()),
     "start/unknown-westport-house": lambda w: _from_anywhere(w.westport_house),
     "kidnap/carried": lambda w: _kidnapped(carried(w.office, KIDNAP_AT_M, CARRIED_M)),
     "kidnap/lift": lambda w: _kidnapped(w.lift),
