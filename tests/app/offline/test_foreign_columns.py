@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shlex
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,22 @@ def test_an_export_of_picoquake_counts_samples_at_the_rate_above(table: np.ndarr
     rows = np.column_stack([1 + np.arange(len(table)), table[:, 1:4] / G, np.degrees(table[:, 4:7])])
     path = write(tmp_path / "a.csv", "count," + ",".join(titles("a_{}", "g_{}", "xyz")), rows, above=above)
     assert same(path, table) == ("read as an export of PicoQuake",)
+
+
+def test_a_file_of_an_openlog_artemis_goes_on_at_midnight(table: np.ndarray, tmp_path: Path) -> None:
+    """Its times of day have hundredths of a second, and each line ends with a comma; the axes of its magnetometer are not those of its gyroscope."""
+    at = datetime(2026, 11, 30, 23, 59, 58)
+    times = [(at + timedelta(seconds=t_s)).strftime("%m/%d/%Y,%H:%M:%S.%f")[:-4] for t_s in table[:, 0].tolist()]
+    rows = np.column_stack([table[:, 1:4] / G * 1e3, np.degrees(table[:, 4:7])])
+    names = ",".join(titles("a{}", "g{}", "XYZ"))
+    lines = [
+        f"{time},{','.join(f'{v:.7g}' for v in row)},1.0,2.0,3.0,25.1,98.5,"
+        for time, row in zip(times, rows, strict=True)
+    ]
+    path = tmp_path / "dataLog00001.TXT"
+    path.write_text("\n".join([f"rtcDate,rtcTime,{names},mX,mY,mZ,imu_degC,output_Hz,", *lines]) + "\n")
+    assert same(path, table) == ("read as an export of OpenLog Artemis",)
+    assert load_foot(path).mag is None
 
 
 DOT_ABOVE = (

@@ -104,6 +104,7 @@ def test_what_can_be_mended_is_said_and_the_track_is_right_or_known_to_be_less_c
     (lambda t, _r: t - (t[:, :1] > 7.005) * [60, 0, 0, 0, 0, 0, 0], "begins anew"),
     (lambda t, _r: np.round(t - (t[:, :1] > 7.005) * [7.01, 0, 0, 0, 0, 0, 0], 6), "begins anew"),
     (lambda t, _r: np.column_stack([t[:, 0] / 20, t[:, 1:]]), "average them down"),
+    (lambda t, _r: np.column_stack([t[:, 0] / 1000, t[:, 1:]]), "are these seconds, not milliseconds"),
     (lambda t, _r: np.column_stack([t[:, 0], t[:, 1:5], 0 * t[:, 5], t[:, 6]]), "gy is constant"),
     (lambda t, _r: np.column_stack([t[:, :5], np.where(t[:, 0] > 6, 1.0, t[:, 5]), t[:, 6]]), "gy does not change"),
     (lambda t, _r: np.column_stack([0 * t[:, 0], t[:, 1:]]), "does not advance"),

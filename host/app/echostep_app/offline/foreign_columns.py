@@ -12,7 +12,8 @@ bei_D4CA6EF17860_20210830_170505.csv of a recording, in github.com/Allwillcome/X
 at rest reads 9.65 and 0.2, which as rad/s would be a bias of 11 deg/s; the titles of the other modes: logger of the SDK for Android. SensorConnect
 (MSCL): data of github.com/mtahakoroglu/gait-driven-inertial-navigation-dataset. gaitmap: example data of github.com/mad-lab-fau/gaitmap. SensorLog:
 titles in public scripts; an iPhone's accelerations have the opposite sign [Apple, CMAccelerometerData: at rest -1 g upwards], which mirrors a track.
-PicoQuake: docs/acquisition_data.md of github.com/PLab-SI/PicoQuake.
+PicoQuake: docs/acquisition_data.md of github.com/PLab-SI/PicoQuake. OpenLog Artemis: its units in sparkfun/OpenLog_Artemis#15; the axes of its
+magnetometer are others than those of its gyroscope [ICM-20948 data sheet, orientation of axes], so it is left out.
 """
 
 from __future__ import annotations
@@ -74,6 +75,8 @@ GAITMAP = _axes("a", "left_sensor.acc_{}", "xyz") | _axes("g", "left_sensor.gyr_
 SENSORLOG = {"t_s": "accelerometerTimestamp_sinceReboot(s)"} | _axes("a", "accelerometerAcceleration{}(G)")
 SENSORLOG_GYROS = ("gyroRotation{}(rad/s)", "motionRotationRate{}(rad/s)")
 PICOQUAKE = {"t_s": "count"} | _axes("a", "a_{}", "xyz") | _axes("g", "g_{}", "xyz")
+ARTEMIS_CLOCK, DAY_S = "rtcTime", 86_400  # hours, minutes and seconds of a day
+ARTEMIS = {"t_s": ARTEMIS_CLOCK} | _axes("a", "a{}") | _axes("g", "g{}")
 MSCL = _axes("a", "scaledAccel{}") | _axes("g", "scaledGyro{}")
 
 
@@ -99,6 +102,7 @@ LOGGERS = (
     *(Logger("SensorLog", SENSORLOG | _axes("g", gyro), units={"force": "-g"}) for gyro in SENSORLOG_GYROS),
     Logger("SensorConnect", {"t_s": "Time"} | MSCL, _axes("m", "scaledMag{}"), {"force": "g"}),
     Logger("PicoQuake", PICOQUAKE, units={"force": "g", "rate": "deg/s"}, above="# Config: data_rate"),
+    Logger("OpenLog Artemis", ARTEMIS, units={"force": "mg", "rate": "deg/s"}),
     Logger("gaitmap, its left sensor", {"t_s": "index"} | GAITMAP, units={"rate": "deg/s"}),
 )
 
@@ -201,6 +205,8 @@ def _counter(name: str, above: list[str], *, clocked: bool) -> tuple[float | Non
     """Counts a second and period of a column that counts samples or ticks; (None, ...) for a column of times."""
     if name == CLOCK:
         return DOT_CLOCK_HZ if _has(above, DOT) else MT_CLOCK_HZ, CLOCK_PERIOD
+    if name == ARTEMIS_CLOCK:
+        return 1.0, DAY_S
     if not COUNTERS.fullmatch(_letters(name)):
         return None, COUNTER_PERIOD
     rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]

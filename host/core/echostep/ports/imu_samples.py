@@ -121,6 +121,9 @@ def rate_complaint(rate: float, range_hz: tuple[float, float], too_slow: str, to
         return ""
     if option:
         return f"t_s gives {rate:.3g} samples a second: is it in {unit}? divide it by {factor:.0f} to have seconds, or say --units {option}"
+    for unit, _, factor in TIME_UNITS:
+        if range_hz[0] <= rate / factor <= range_hz[1]:
+            return f"t_s gives {rate:.3g} samples a second: are these seconds, not {unit}? multiply it by {factor:.0f}, or say --units s"
     return f"t_s gives {rate:.3g} samples a second: is it in seconds? {too_slow if rate < range_hz[0] else too_fast}"
 
 
