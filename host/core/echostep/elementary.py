@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from echostep.arrays import Bools, Floats
-from echostep.jit import kernel
+from echostep.jit import kernel, lean_kernel
 
 Angle = TypeVar("Angle", float, Floats)
 _EXP, _LOG, _SIN, _COS = range(4)
@@ -24,6 +24,12 @@ _EXP, _LOG, _SIN, _COS = range(4)
 def wrap(angle_rad: Angle) -> Angle:
     """The same angle, or angles, in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@lean_kernel
+def wrap_angle(angle: float) -> float:
+    """The same angle in [-pi, pi), for kernels. It rounds differently from `wrap`, and results depend on the last bit."""
+    return angle - (2.0 * math.pi) * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 def exp(x: Floats) -> Floats:

@@ -18,7 +18,6 @@ from echostep.beacons.beliefs import (
     BeaconMeasurement,
     empty_beliefs,
     set_beliefs,
-    wrap_angle,
 )
 from echostep.beacons.model import BeaconSettings, beacon_model
 from echostep.beacons.slam import (
@@ -30,6 +29,7 @@ from echostep.beacons.slam import (
     update_by_measurement,
 )
 from echostep.beacons.step import Beacons, no_waiting, update_by_reading
+from echostep.elementary import wrap_angle
 from echostep.particles.arrays import ParticleArrays
 from echostep.walls.echo_sources import Walls
 from echostep.walls.index import WallIndex

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.elementary import product, weighted_covariance
-from echostep.jit import kernel, lean_kernel, lean_part, part
+from echostep.elementary import product, weighted_covariance, wrap_angle
+from echostep.jit import kernel, lean_part, part
 
-TWO_PI = 2.0 * math.pi
 X, Y, AXIS = 0, 1, 2  # states: place on the sheet (m), direction of the beacon's axis (rad)
 XX, XY, X_AXIS, YY, Y_AXIS, AXIS_AXIS = 0, 1, 2, 3, 4, 5  # stored terms of the symmetric covariance
 
@@ -66,12 +65,6 @@ def place_beacon(beliefs: BeaconBeliefs, slot: int, x: Floats, y: Floats, place_
         beliefs.mean[i, slot] = x[i], y[i], 0.0
         beliefs.cov[i, slot] = place_var, 0.0, 0.0, place_var, 0.0, math.pi * math.pi
         beliefs.doubt[i, slot] = 1.0
-
-
-@lean_kernel
-def wrap_angle(angle: float) -> float:
-    """The same angle in [-pi, pi), for kernels. It rounds differently from `elementary.wrap`, and results depend on the last bit."""
-    return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
 @lean_part

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.beacons.beliefs import wrap_angle
+from echostep.elementary import wrap_angle
 from echostep.jit import kernel, part
 from echostep.particles.limits import THREE_SD2
 

@@ -16,7 +16,6 @@ from echostep.arrays import Bools, Floats
 from echostep.beacons.beliefs import (
     AXIS,
     AXIS_AXIS,
-    TWO_PI,
     X_AXIS,
     XX,
     XY,
@@ -27,14 +26,15 @@ from echostep.beacons.beliefs import (
     X,
     Y,
     correct,
-    wrap_angle,
 )
 from echostep.beacons.model import BeaconModel
+from echostep.elementary import wrap_angle
 from echostep.jit import kernel, lean_kernel, lean_part, part
 from echostep.particles.arrays import ParticleArrays
 from echostep.particles.limits import THREE_SD2
 from echostep.walls.index import WallIndex, crosses_wall
 
+TWO_PI = 2.0 * math.pi
 # Assumed, not measured.
 GREATEST_ODDS = math.exp(3.0)  # of a particle, that a beacon was moved
 LEAST_DOUBT = 1.0 / GREATEST_ODDS  # of a particle, relative to a beacon that has just been placed

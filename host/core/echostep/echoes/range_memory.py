@@ -17,7 +17,8 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.echoes.likelihood import STRAY_ON, EchoModel, detection, normal
-from echostep.jit import inline_part, kernel, lean_part
+from echostep.elementary import wrap_angle
+from echostep.jit import kernel, lean_part
 from echostep.walls.index import CONE_RAD
 from echostep.walls.tile_points import WALL
 
@@ -101,7 +102,7 @@ def _count(ranger: Floats, range_m: float) -> None:
 @lean_part
 def _go_on(ranger: Floats, x_m: float, y_m: float, axis_rad: float) -> float:
     """Advance to the place and axis of the next ping; returns the probability that the view is the same there, 0 for the first one."""
-    dx_m, dy_m, turn_rad = x_m - ranger[X], y_m - ranger[Y], _between(axis_rad, ranger[AXIS])
+    dx_m, dy_m, turn_rad = x_m - ranger[X], y_m - ranger[Y], abs(wrap_angle(axis_rad - ranger[AXIS]))
     ranger[X], ranger[Y], ranger[AXIS] = x_m, y_m, axis_rad
     if math.isnan(dx_m):
         return 0.0
@@ -124,7 +125,7 @@ def _densities_alike(
         return density, density
     if range_m <= 0.0:
         return 0.0, 0.0
-    slant_rad, off_m = _between(ranger[NORMAL], axis_rad), range_m - ranger[DISTANCE]
+    slant_rad, off_m = abs(wrap_angle(ranger[NORMAL] - axis_rad)), range_m - ranger[DISTANCE]
     detected = detection(ranger[DISTANCE], slant_rad, WALL, m)
     variance_m2 = ranger[DISTANCE_VAR] + (m.sd_m + m.slant_m * slant_rad) ** 2
     blurred = normal(off_m, math.sqrt(variance_m2 + blur_m**2))
@@ -138,7 +139,7 @@ def _update(ranger: Floats, range_m: float, axis_rad: float, power: float, goes_
         if not goes_on:  # otherwise it is likelier that an echo was missed
             ranger[DISTANCE] = math.nan
     elif goes_on and not math.isnan(ranger[DISTANCE]):
-        error_m = m.sd_m + m.slant_m * _between(ranger[NORMAL], axis_rad)
+        error_m = m.sd_m + m.slant_m * abs(wrap_angle(ranger[NORMAL] - axis_rad))
         total, difference = ranger[DISTANCE_VAR] + error_m**2 / power, range_m - ranger[DISTANCE]
         gain_m, gain_rad = ranger[DISTANCE_VAR] / total, ranger[COVARIANCE] / total
         ranger[DISTANCE] += gain_m * difference
@@ -149,9 +150,3 @@ def _update(ranger: Floats, range_m: float, axis_rad: float, power: float, goes_
     else:
         ranger[DISTANCE], ranger[NORMAL] = range_m, axis_rad
         ranger[DISTANCE_VAR], ranger[COVARIANCE], ranger[NORMAL_VAR] = m.sd_m**2, 0.0, AXIS_SD_RAD**2
-
-
-@inline_part
-def _between(a_rad: float, b_rad: float) -> float:
-    """Angle between two directions."""
-    return abs((a_rad - b_rad + math.pi) % (2.0 * math.pi) - math.pi)
