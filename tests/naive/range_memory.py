@@ -87,7 +87,7 @@ class Ranger:
 
 
 def densities(pings: memory.PlacedPings, log_anywhere: Floats, blur_m: float, m: EchoModel) -> Floats:
-    """Rows STRAY to BLURRED of pings (k,)."""
+    """Rows STRAY to LOG_BLURRED of pings (k,)."""
     rangers, rows = (Ranger(m), Ranger(m)), []
     for which, x, y, axis, range_m, power, log in zip(*(a.tolist() for a in (*pings, log_anywhere)), strict=True):
         r, anywhere = rangers[which], math.exp(log)

@@ -10,8 +10,17 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoSettings, echo_model
-from echostep.echoes.range_memory import DISTANCE, NORMAL, PlacedPings, new_memory, remembered_densities
-from echostep.echoes.unplanned import BIN_M, Background, RangeMemory, UnplannedDensities
+from echostep.echoes.range_memory import (
+    ALIKE,
+    DISTANCE,
+    LOG,
+    NORMAL,
+    STRAY,
+    PlacedPings,
+    new_memory,
+    remembered_densities,
+)
+from echostep.echoes.unplanned import BIN_M, Background, RangeMemory
 from echostep.localization import FilterSettings
 from echostep.localization.belief import TEMPER
 from echostep.localization.settings import UNPLANNED_DOOR, with_plan_error
@@ -54,7 +63,7 @@ def along(x_m: Floats, range_m: Floats) -> PlacedPings:
     return PlacedPings(np.zeros(len(x_m), np.int64), x_m, 0.0 * ones, 0.5 * math.pi * ones, range_m, ones)
 
 
-def densities(range_m: Floats, echo: EchoSettings = ECHO) -> UnplannedDensities:
+def densities(range_m: Floats, echo: EchoSettings = ECHO) -> Floats:
     """Of echoes of the left ranger every SPACING_M on a way along x."""
     return RangeMemory(EVERYWHERE, echo).densities(along(np.arange(0.0, len(range_m)) * SPACING_M, range_m))
 
@@ -67,7 +76,7 @@ def log_planned(range_m: Floats, true_m: float) -> Floats:
 
 def test_a_corridor_that_goes_on_tells_little() -> None:
     range_m = 1.2 + SD_M * np.random.default_rng(1).standard_normal(400)
-    gain = log_planned(range_m, 1.2)[20:] - densities(range_m).either[20:]
+    gain = log_planned(range_m, 1.2)[20:] - densities(range_m)[LOG, 20:]
     assert abs(gain.mean()) < 0.5
 
 
@@ -75,27 +84,27 @@ def test_a_corridor_that_goes_on_tells_little() -> None:
 def test_an_error_that_stays_along_a_wall_casts_less_doubt(off_m: float) -> None:
     """On 100 m of wall a plan that is one standard deviation off loses to the rival, which learns it."""
     range_m = 1.2 + 0.5 * SD_M * np.random.default_rng(2).standard_normal(400)
-    log_ratio = log_planned(range_m, 1.2 + off_m)[20:] - densities(range_m).either[20:]
+    log_ratio = log_planned(range_m, 1.2 + off_m)[20:] - densities(range_m)[LOG, 20:]
     assert log_ratio.sum() < -35.0
     assert TEMPER * log_ratio.sum() > 3.0 * UNPLANNED_DOOR  # no more than three walls that were never built
 
 
 def test_a_wall_where_a_door_was_foretold_does() -> None:
     range_m = np.full(24, 1.2)
-    log_ratio = log_planned(range_m, 2.5)[20:] - densities(range_m).either[20:]
+    log_ratio = log_planned(range_m, 2.5)[20:] - densities(range_m)[LOG, 20:]
     assert log_ratio.sum() < -8.0
 
 
 def test_a_rival_knows_a_wall_no_better_than_the_plan_does() -> None:
     settings = FilterSettings(echo=ECHO, plan_sd_m=0.1)
     range_m = np.full(6, 1.5)
-    exact, off = densities(range_m).alike[5], densities(range_m, with_plan_error(settings)).alike[5]
+    exact, off = densities(range_m)[ALIKE, 5], densities(range_m, with_plan_error(settings))[ALIKE, 5]
     assert off == pytest.approx(exact * SD_M / math.hypot(SD_M, 0.1), rel=0.3)
 
 
 def test_a_door_is_news() -> None:
     range_m = np.concatenate([np.full(20, 1.2), np.full(4, 2.5)])
-    gain = log_planned(range_m, 2.5)[20:] - densities(range_m).either[20:]
+    gain = log_planned(range_m, 2.5)[20:] - densities(range_m)[LOG, 20:]
     assert gain[0] > 3.0
     assert gain[1:].max() < 2.0
 
@@ -103,10 +112,10 @@ def test_a_door_is_news() -> None:
 def test_silence_goes_on_in_a_hall_as_a_wall_does_in_a_corridor() -> None:
     """Where walls are out of reach the plan predicts silence nearly as well as the rival, which knows no better."""
     of = densities(np.zeros(40))
-    silent = np.log((1.0 - ECHO.hidden) * (1.0 - of.stray) + ECHO.hidden * np.exp(of.either))
-    assert (silent - of.either)[20:].mean() > -0.1
+    silent = np.log((1.0 - ECHO.hidden) * (1.0 - of[STRAY]) + ECHO.hidden * np.exp(of[LOG]))
+    assert (silent - of[LOG])[20:].mean() > -0.1
 
 
 def test_an_echo_behind_a_silent_ping_is_news() -> None:
     of = densities(np.array([1.2, 1.2, 0.0, 0.0, 1.2]))
-    assert of.alike[4] < 0.1 * of.alike[1]
+    assert of[ALIKE, 4] < 0.1 * of[ALIKE, 1]

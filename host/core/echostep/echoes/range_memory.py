@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What the last echoes of a ranger tell of its next one, without a plan: the wall that answered goes on, and silence does.
 
-In: `PlacedPings` in order of time. Out: for each the probabilities and densities STRAY to BLURRED. Owns nothing: what is remembered of each ranger is
-a row of `new_memory`.
+In: `PlacedPings` in order of time. Out: for each the probabilities and densities STRAY to LOG_BLURRED. Owns nothing: what is remembered of each
+ranger is a row of `new_memory`.
 
 A smooth wall answers from the foot of the perpendicular, whatever the ranger's axis: so its distance shrinks by the way along its normal. An extended
 Kalman filter of distance and direction of the normal. An edge or a corner answers as a wall whose normal turns, which TURN_SD_RAD allows.
@@ -39,7 +39,7 @@ REMEMBERED = 200.0  # pings: tens of metres of path
 X, Y, AXIS, DISTANCE, NORMAL, DISTANCE_VAR, COVARIANCE, NORMAL_VAR, MISSED, HEARD, LAST, SILENT = range(12)
 # Of a ping: probability of a second reflection where nothing answers; odds that a silent one missed its echo, 0 for an echo; its density if like the
 # ping before, without these two; its density to its power, anywhere or like the ping before; the log of it, and of it blurred
-STRAY, ODDS, ALIKE, DENSITY, EITHER, BLURRED = range(6)
+STRAY, ODDS, ALIKE, DENSITY, LOG, LOG_BLURRED = range(6)
 
 
 class PlacedPings(NamedTuple):
@@ -64,11 +64,11 @@ def new_memory() -> Floats:
 def remembered_densities(
     memory: Floats, pings: PlacedPings, log_anywhere: Floats, blur_m: float, m: EchoModel
 ) -> Floats:
-    """Rows STRAY to BLURRED of pings (k,), whose densities anywhere in the building have these logs; blurred by a standard deviation.
+    """Rows STRAY to LOG_BLURRED of pings (k,), whose densities anywhere in the building have these logs; blurred by a standard deviation.
 
     Changes the memory.
     """
-    of = np.empty((BLURRED + 1, len(log_anywhere)))
+    of = np.empty((LOG_BLURRED + 1, len(log_anywhere)))
     for k in range(len(log_anywhere)):
         ranger, range_m, axis_rad, power = memory[pings.ranger[k]], pings.range_m[k], pings.axis_rad[k], pings.power[k]
         anywhere = math.exp(log_anywhere[k])
@@ -81,8 +81,8 @@ def remembered_densities(
         new = changed * (anywhere + missed) ** power
         of[STRAY, k], of[ODDS, k], of[ALIKE, k] = stray, missed, alike
         of[DENSITY, k] = new + (1.0 - changed) * (alike + missed) ** power
-        of[EITHER, k] = math.log(of[DENSITY, k])
-        of[BLURRED, k] = math.log(new + (1.0 - changed) * (blurred + missed) ** power)
+        of[LOG, k] = math.log(of[DENSITY, k])
+        of[LOG_BLURRED, k] = math.log(new + (1.0 - changed) * (blurred + missed) ** power)
     return of
 
 

@@ -59,19 +59,13 @@ def background(walls: Walls, floor: Floor, model: EchoModel) -> Background:
 
 
 class UnplannedDensities(NamedTuple):
-    """Of pings (k,): `stray`, probability of a second reflection where nothing answers, by the one before; `missed`, odds that a silent ping missed
-    its echo, 0 for an echo; `alike`, the density if like the ping before, without these two; `density`, to the pings' power, anywhere in the building
-    or like the ping before; its log, `either`, and `blurred`, as for a scattered cloud.
+    """Of pings (k,): logs of densities to their power, anywhere in the building or like the ping before, and blurred as for a scattered cloud.
 
     `counts`: share that is evidence for a cloud: information deferred from a turn only selects particles, since the trunk follows the foot late.
     """
 
-    stray: Floats
-    missed: Floats
-    alike: Floats
-    density: Floats
-    either: Floats
-    blurred: Floats
+    log: Floats
+    log_blurred: Floats
     counts: Floats
 
 
@@ -82,12 +76,10 @@ class RangeMemory:
         self._background, self._model, self._blur_m = background, echo_model(echo), blur_m
         self._memory = new_memory()
 
-    def densities(self, pings: PlacedPings) -> UnplannedDensities:
-        """For pings (k,) in order of time."""
+    def densities(self, pings: PlacedPings) -> Floats:
+        """Rows STRAY to LOG_BLURRED (6, k) for pings in order of time."""
         anywhere = self._background.of(pings.range_m)
-        rows = remembered_densities(self._memory, pings, anywhere, self._blur_m, self._model)
-        stray, missed, alike, density, either, blurred = rows
-        return UnplannedDensities(stray, missed, alike, density, either, blurred, np.ones(len(anywhere)))
+        return remembered_densities(self._memory, pings, anywhere, self._blur_m, self._model)
 
 
 @kernel
@@ -162,11 +154,10 @@ class UsablePings:
         x_m, y_m = self._x_m + way_x_m, self._y_m + way_y_m
         self._x_m, self._y_m = self._x_m + segment.dx_m, self._y_m + segment.dy_m
         pings = PlacedPings(measured.ranger[used], x_m[used], y_m[used], axis[used], range_m[used], power[used])
-        unplanned = self._ranges.densities(pings)
+        stray, missed, alike, density, log, log_blurred = self._ranges.densities(pings)
         return PingBatch(
-            share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used],
-            unplanned.stray, unplanned.missed, unplanned.alike, unplanned.density,
-        ), unplanned._replace(counts=1.0 - unused_m[used] / travel_m[used])  # fmt: skip
+            share[used], pings.axis_rad, pings.range_m, pings.power, pings.ranger, travel_m[used], stray, missed, alike, density,
+        ), UnplannedDensities(log, log_blurred, counts=1.0 - unused_m[used] / travel_m[used])  # fmt: skip
 
     def _travels(self, ranger: Ints, range_m: Floats, viewed_m: Floats) -> tuple[Floats, Floats]:
         """Way of the view (k,) between each ping and the one before it of the same ranger, 0 before its first echo; the deferred share."""

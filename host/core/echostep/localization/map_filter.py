@@ -239,7 +239,7 @@ class MapFilter:
     ) -> None:  # fmt: skip
         """Propagate and reweight one cloud, and its hypothesis by this share of the evidence of the pings."""
         # By the spacing of sparse particles
-        model, alone = (self._blurred, unplanned.blurred) if cloud.is_scattered else (self._model, unplanned.either)
+        model, alone = (self._blurred, unplanned.log_blurred) if cloud.is_scattered else (self._model, unplanned.log)
         evidence = cloud.propagate_and_reweight(move, pings, model, self.building.walls)
         # Where there were several places, a light one may have lost its particles on one level by chance.
         if cloud.is_on_any_level and cloud.is_in_one_place:

@@ -17,7 +17,7 @@ import numpy as np
 
 from echostep.arrays import Floats, Ints
 from echostep.echoes.likelihood import EchoModel
-from echostep.echoes.range_memory import PlacedPings
+from echostep.echoes.range_memory import LOG, PlacedPings
 from echostep.echoes.range_table import OUTSIDE_ENTRY, SECTORS, TablePing, TablePings, log_densities
 from echostep.echoes.unplanned import RangeMemory
 from echostep.elementary import exp, log
@@ -144,7 +144,7 @@ class Search(PressureLag):
         """Log-density of a ping without a plan, to its power; `way`: from the end of the path to where it was triggered."""
         x_m, y_m = self._x_m + way.dx_m, self._y_m + way.dy_m
         values = (np.array([v]) for v in (x_m, y_m, ping.axis_rad, ping.range_m, ping.power))
-        return float(self._unplanned.densities(PlacedPings(np.array([ranger]), *values)).either[0])
+        return float(self._unplanned.densities(PlacedPings(np.array([ranger]), *values))[LOG, 0])
 
     def _step(self, move: Move, begin: float, end: float, log_factor: Floats, axis_rad: float) -> float:
         """Move by a piece, and multiply by factors; returns the log of the mean factor."""
