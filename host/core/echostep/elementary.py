@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Angles, elementary functions and products, with the same bits on every processor of a kind.
+"""Angles, elementary functions and products, with the same bits on processors with narrow and wide vectors.
 
 In: arrays. Out: arrays. Owns nothing.
 
