@@ -10,16 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ELF, ROOT, TWIN, needs_twin
+from board_runs import ELF, TWIN, needs_twin
 from echostep.localization import Estimate, TrackStatus, digest
-from echostep.plan import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_simulation.devices.board import BoardProcess, PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
-from walks import errors_of
+from walks import PLAN, errors_of
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 WAYPOINTS = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5))
 
 
@@ -58,18 +57,6 @@ def test_estimates_are_in_order_and_finite() -> None:
 def test_the_same_chunks_give_the_same_bits_and_other_seeds_others() -> None:
     assert digest(track(CHUNKS)[1]) == digest(track(CHUNKS)[1])
     assert digest(track(CHUNKS)[1]) != digest(track(CHUNKS, seed=1)[1])
-
-
-@pytest.mark.long
-def test_chunks_may_be_cut_anywhere() -> None:
-    rng = random.Random(1)
-    cut, beginning = [], CHUNKS[: len(CHUNKS) // 3]
-    for chunk in beginning:
-        at = rng.randrange(len(chunk.data) + 1)
-        cut += [replace(chunk, data=part) for part in (chunk.data[:at], chunk.data[at:]) if part]
-    tracker, whole = Tracker(PLAN, SCENARIO.start), track(beginning)[1]
-    assert len(whole) > 3
-    assert digest(e for chunk in cut for e in tracker.feed(chunk)) == digest(whole)
 
 
 def test_without_the_board_the_foot_goes_on_and_grows_less_sure() -> None:
