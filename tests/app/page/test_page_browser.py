@@ -212,7 +212,7 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
         wait_for(page, "echostep.last.beacons.length > 5 && echostep.last.guidance.path.length > 1")
         wait_for(page, STILL)
         seen, path = page.evaluate(f"[{GUIDED}, echostep.last.guidance.path]")
-        colours = [painted(page, "goal", *place, within_px=NEAR_PX) for place in path[1:]]
+        colours = [painted(page, "goal", x, y, NEAR_PX) for x, y in path[1:]]
         found = violations(page)
         picture(page, "guide" if look == "bright" else "guide-wide", tmp_path)
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
