@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import zstandard
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
@@ -36,6 +36,18 @@ CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 256]) * 
 def write(path: Path, chunks: list[Chunk] = CHUNKS) -> bytes:
     path.unlink(missing_ok=True)
     return write_recording(path, chunks, {"seed": "4", "note": "a test"})
+
+
+@given(st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_cut_file_gives_what_came_before_the_cut(tmp_path: Path, draw: st.DataObject) -> None:
+    whole = write(tmp_path / "a.mcap")
+    cut = draw.draw(st.integers(400, len(whole) - 200))
+    (tmp_path / "cut.mcap").write_bytes(whole[:cut])
+    recording = open_recording(tmp_path / "cut.mcap")
+    found = list(recording.chunks())
+    assert found == CHUNKS[: len(found)]
+    assert len(found) >= len(CHUNKS) * (cut - 800) // len(whole) - 1
 
 
 def recovered_chunks(path: Path) -> list[Chunk]:
