@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import zipfile
@@ -119,6 +120,12 @@ def test_repeated_corners_are_one(tmp_path: Path) -> None:
     plan = load_plan(plan_file(tmp_path / "a.json", [[1, 1], [2, 1], [2, 1], [2, 2], [1, 2], [1, 2], [1, 1]]))
     assert plan.levels[0].obstacles[0].tolist() == [[1, 1], [2, 1], [2, 2], [1, 2]]
     check_plan(plan)
+
+
+def test_an_obstacle_of_a_million_corners_is_named(tmp_path: Path) -> None:
+    corners = [[math.cos(k), math.sin(k)] for k in range(10_001)]
+    with pytest.raises(EchostepError, match=r"obstacles\[0\]: 10001 corners, expected 10000 at most"):
+        load_plan(plan_file(tmp_path / "a.json", corners))
 
 
 @pytest.mark.process
