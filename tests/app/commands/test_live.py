@@ -84,8 +84,6 @@ TWO_PORTS = ("--board", "x", "--mtx", "y")
 MISTAKES: dict[str, list[object]] = {
     "no such recording": ["replay", "none.mcap", "--plan", PLAN],
     "a file that is no recording": ["replay", __file__, "--plan", PLAN],
-    "no such plan": ["live", "--plan", "none.json", *TWO_PORTS],
-    "no such port": ["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"],
     "no such kind of port": ["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"],
     "a start without heading": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2"],
     "a start of no number": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2,nan"],
