@@ -7,6 +7,7 @@ import errno
 import io
 import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -49,6 +50,13 @@ def echostep(
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
     assert ends in (None, status), f"exit status {status}: {_text(out)}{_text(err)}"
     return subprocess.CompletedProcess(command, status, _text(out), _text(err))
+
+
+def sha_of(printed: str) -> str:
+    """The digest of the estimates that a run has printed."""
+    found = re.search(r"sha256\s+([0-9a-f]{16})", printed)
+    assert found, printed
+    return found[1]
 
 
 def fill_disk(monkeypatch: pytest.MonkeyPatch, most_bytes: int) -> None:

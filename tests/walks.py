@@ -22,6 +22,7 @@ from echostep_simulation.scenario import Scenario, demo_scenario
 
 DEMO = ROOT / "host/core/echostep/plans/demo.json"
 WALK = ROOT / "tests/captures/walk.mcap"
+PLAN = load_plan(DEMO)
 
 
 def foot_track() -> Track:
@@ -35,7 +36,7 @@ def foot_track() -> Track:
 @cache
 def walk_chunks(seconds: float = 15.0) -> tuple[Chunk, ...]:
     """Chunks of both ports, Python board, seed 3."""
-    scenario = demo_scenario(load_plan(DEMO), 3, PythonBoard(3))
+    scenario = demo_scenario(PLAN, 3, PythonBoard(3))
     chunks = scenario.chunks()
     first = next(chunks)
     rest = takewhile(lambda chunk: chunk.t_arrival_ns - first.t_arrival_ns < seconds * 1e9, chunks)

@@ -127,8 +127,7 @@ def run(elf: Path, faults: tuple[str, ...]) -> Sent:
     """Run a firmware for 4.5 s."""
     bench = Bench(BoardProcess([str(TWIN), "--elf", str(elf)]))
     table, values, last = rows(), dict[str, NDArray[Any]](), int(1_000 * LAST_S)
-    for fault in faults:
-        bench.fault(fault)
+    bench.fault(*faults)
     bench.run(300, table[:300])
     bench.ask(SUBSCRIBE)
     for when, begin, end in (("at rest", 300, REST_MS), ("in motion", REST_MS, len(table))):

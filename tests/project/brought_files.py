@@ -16,7 +16,7 @@ from board_runs import ROOT
 from command_line import echostep
 from echostep.offline.imu_csv import Imu
 from echostep.plan import load_plan
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from offline.imu_files import write
 from scorecard.tapped_walks import tapped as record_tapped
 
@@ -61,7 +61,7 @@ def drawing(path: Path) -> None:
 
 def foot(path: Path) -> None:
     """A simulated walk of eight steps."""
-    write(path, Imu(*samples(course(MANNERS["walking"], steps=8), 100, rng=np.random.default_rng(1))))
+    write(path, Imu(*walking(8)))
 
 
 def foreign(path: Path) -> None:

@@ -15,12 +15,13 @@ from pathlib import Path
 import pytest
 
 from board_runs import ROOT
+from command_line import PROGRAM
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from players import babbling_port
 from waiting import PATIENCE_S, ran
+from walks import DEMO
 
-PYTHON = [sys.executable, "-m", "echostep"]
 MANUAL = (ROOT / "host/docs/page.md").read_text()
 
 
@@ -50,8 +51,7 @@ def test_it_runs_without_a_home_in_a_narrow_terminal_of_locale_c(tmp_path: Path,
         "TMPDIR": str(tmp_path),
     }
     environment |= {} if home is None else {"HOME": home}
-    plan = ROOT / "host/core/echostep/plans/demo.json"
-    command = [sys.executable, "-m", "echostep", "plan", "check", str(plan)]
+    command = [*PROGRAM, "plan", "check", str(DEMO)]
     done = subprocess.run(command, env=environment, cwd="/", capture_output=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
     assert b"Traceback" not in done.stderr
@@ -106,7 +106,7 @@ def test_it_records_as_another_user_on_a_read_only_system(
     environment |= {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     identity = encode(m.Identity(0, m.SCHEMA_HASH, 1, 1, 0, 0), 0)
     with babbling_port(b"\0" + identity) as port:
-        command = [*PYTHON, "record", "--board", port, "--seconds", "1", "--out", str(data / "walk.mcap")]
+        command = [*PROGRAM, "record", "--board", port, "--seconds", "1", "--out", str(data / "walk.mcap")]
         script = CONFINED.format(
             parents=" ".join(sorted({str(folder.parent) for folder in (data, kernels)} - {str(data)})),
             folders=f"{data} {kernels}", data=data, kernels=kernels, command=shlex.join(command), marker="echostep-test",

@@ -20,7 +20,7 @@ import yaml
 
 from board_runs import ROOT
 from command_line import echostep
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from release import wheel as wheels
 from waiting import ran
 from walks import DEMO
@@ -166,8 +166,7 @@ def test_the_core_alone_decodes_tracks_and_navigates_a_foot(core: tuple[Path, di
     whole = echostep("replay", walk, "--plan", DEMO, "--headless", "--out", tmp_path / "whole")
     assert told.splitlines()[0] in whole.stdout.splitlines()  # number and digest of the estimates
     assert (tmp_path / "core/track.csv").read_bytes() == (tmp_path / "whole/track.csv").read_bytes()
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=6), 100, rng=np.random.default_rng(1))
-    rows = np.column_stack([t_s, accel, gyro])
+    rows = np.column_stack(walking(6))
     np.savetxt(tmp_path / "imu.csv", rows, delimiter=",", header="t_s,ax,ay,az,gx,gy,gz", comments="")
     assert "6 steps" in wheels.run([program, "foot", tmp_path / "imu.csv"], env, tmp_path)
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import as_file, files
 from typing import Any
 
 import numpy as np
@@ -12,23 +11,17 @@ from numpy.typing import NDArray
 
 from echostep.board import messages as m
 from echostep.board.frames import BoardReader
-from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk
 from echostep.xsens import MtxReader
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
-
-
-@pytest.fixture(scope="module")
-def plan() -> Plan:
-    with as_file(files("echostep") / "plans" / "demo.json") as path:
-        return load_plan(path)
+from walks import PLAN
 
 
 @pytest.mark.slow
-def test_equal_seeds_give_equal_chunks_in_order(plan: Plan) -> None:
+def test_equal_seeds_give_equal_chunks_in_order() -> None:
     def run(seed: int) -> list[Chunk]:
-        return list(Scenario(plan, ((2.0, 7.5), (9.0, 7.5)), seed, PythonBoard(seed)).chunks())
+        return list(Scenario(PLAN, ((2.0, 7.5), (9.0, 7.5)), seed, PythonBoard(seed)).chunks())
 
     first, again, other = run(1), run(1), run(2)
     assert first == again
@@ -44,9 +37,9 @@ def test_equal_seeds_give_equal_chunks_in_order(plan: Plan) -> None:
     assert mtx_reader.counts.lost == mtx_reader.counts.skipped_bytes == mtx_reader.counts.bad_checksum == 0
 
 
-def test_a_configuration_reaches_the_board(plan: Plan) -> None:
+def test_a_configuration_reaches_the_board() -> None:
     wanted = m.Configure(m.Sensors.RANGER_LEFT, m.Schedule.SEQUENTIAL, 50, 5, m.PressureMode.HIGH_SPEED)
-    scenario = Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1), configure=wanted)
+    scenario = Scenario(PLAN, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1), configure=wanted)
     reader = BoardReader()
     found = [x for c in scenario.chunks() if c.port == BOARD for x in reader.feed(c.data)]
     assert [x for x in found if isinstance(x, m.Configuration)][-1].sensors == m.Sensors.RANGER_LEFT
@@ -65,31 +58,31 @@ class Mute:
     def close(self) -> None: ...
 
 
-def test_a_scenario_can_be_paced_without_a_boards_bytes(plan: Plan) -> None:
+def test_a_scenario_can_be_paced_without_a_boards_bytes() -> None:
     board = Mute()
-    for chunk in Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, board).chunks():
+    for chunk in Scenario(PLAN, ((2.0, 7.5), (6.0, 7.5)), 1, board).chunks():
         assert abs((chunk.t_arrival_ns - 1_000_000_000) * 1e-6 - board.ms) <= 60
 
 
-def test_each_sample_has_its_sync_edge(plan: Plan) -> None:
-    scenario = Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1))
+def test_each_sample_has_its_sync_edge() -> None:
+    scenario = Scenario(PLAN, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1))
     reader = BoardReader()
     found = [x for c in scenario.chunks() if c.port == BOARD for x in reader.feed(c.data) if isinstance(x, m.Sync)]
     ticks_s = np.array([x.ticks for x in found]) * 0.5e-6
     assert np.abs(ticks_s - scenario.mtx.t_s[: len(ticks_s)]).max() < 2e-6
 
 
-def test_the_demo_walk_passes_no_wall(plan: Plan) -> None:
+def test_the_demo_walk_passes_no_wall() -> None:
     """Doors are wide enough, corners are not cut."""
-    path = demo_scenario(plan, 1, PythonBoard(1)).walk.trunk_m[::50]
-    for x0, y0, x1, y1 in plan.levels[0].walls:
+    path = demo_scenario(PLAN, 1, PythonBoard(1)).walk.trunk_m[::50]
+    for x0, y0, x1, y1 in PLAN.levels[0].walls:
         a, b = np.array([x0, y0]), np.array([x1, y1])
         share = np.clip((path - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
         assert np.hypot(*(path - a - share[:, None] * (b - a)).T).min() > 0.3
 
 
-def test_the_truth_file_is_the_trunk_at_fifty_hertz(plan: Plan, tmp_path: Any) -> None:
-    scenario = Scenario(plan, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1))
+def test_the_truth_file_is_the_trunk_at_fifty_hertz(tmp_path: Any) -> None:
+    scenario = Scenario(PLAN, ((2.0, 7.5), (6.0, 7.5)), 1, PythonBoard(1))
     scenario.write_truth(tmp_path / "truth.csv", 2.0)
     table = np.loadtxt(tmp_path / "truth.csv", delimiter=",", skiprows=1)
     assert (tmp_path / "truth.csv").read_text().startswith("t_s,x,y,heading_rad,z\n")

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.errors import EchostepError
 from echostep.foot.steps import FootCounts, Track
 from echostep.localization import TrackStatus
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import Level, load_plan
+from echostep.plan import Level
 from echostep_app.cli import app
 from echostep_app.mapping.graph.graph import Closure
 from echostep_app.mapping.graph.nodes import Nodes
@@ -45,6 +44,7 @@ from echostep_studies.simulation.fischer_trails import TRAILS, Trail, measure_tr
 from needs_data import needs_data
 from studies.carmen_logs import WALLS as WALLS_OF_LOG
 from studies.carmen_logs import write_log
+from walks import PLAN
 
 WALLS = np.array([[0.0, 0.0, 10.0, 0.0], [0.0, 3.0, 10.0, 3.0], [0.0, 6.0, 10.0, 6.0]])
 
@@ -159,7 +159,7 @@ def test_the_loop_has_its_rooms_and_its_furniture() -> None:
 @pytest.mark.long
 def test_one_walk_gives_its_rows(tmp_path: Path) -> None:
     """The demo's walk, drawn: better than the foot alone; a second person is tracked on the drawing."""
-    site = Site(load_plan(ROOT / "host/core/echostep/plans/demo.json"), DEMO_WAYPOINTS)
+    site = Site(PLAN, DEMO_WAYPOINTS)
     row, second = drawn_rows("office/demo", site, 2, tmp_path / "office.png")
     assert row.rmse_m < 0.5
     assert row.wrong == 0

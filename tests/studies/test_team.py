@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.board.gateway import Gateway
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import load_plan
 from echostep_simulation.people.walker import Manner, Person, walk
 from echostep_simulation.scenario import START_NS
 from echostep_simulation.world.tower import STOREY_M, stairs_from, tower
@@ -26,8 +24,8 @@ from echostep_studies.operation.walks import CHANGE_S, MANNERS, operation, waypo
 from echostep_studies.team import study, tracking, walks
 from echostep_studies.team.beacons import MOST_EACH, dropped_on, with_dropped_beacons
 from echostep_studies.team.walks import AGAIN_S, TeamWalks, encounters
+from walks import PLAN
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 T_S = np.arange(0.0, 100.0, 0.02)
 
 

@@ -55,9 +55,6 @@ def test_the_licence_of_every_dependency_is_listed() -> None:
         assert "GPL" not in licences.licence(package).replace("LGPL", ""), f"{name} would bind a program that is MIT"
 
 
-TEXT = (ROOT / "host/tested-versions.txt").read_text()
-
-
 PROJECTS = [tomllib.loads((ROOT / f"host/{ring}/pyproject.toml").read_text())["project"] for ring in ("core", "app")]
 EXTRAS = PROJECTS[1]["optional-dependencies"]
 

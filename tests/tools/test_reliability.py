@@ -81,9 +81,6 @@ def test_a_killed_run_is_started_again_while_the_mtx_is_unplugged(tmp_path: Path
     assert outcome.wrongly_sure == 0
 
 
-ROUND = ((16.0, 7.5), (24.0, 7.5), (24.0, 2.0), (2.0, 2.0), (2.0, 7.5), (16.0, 7.5))
-
-
 @pytest.mark.long
 @needs_twin
 @pytest.mark.parametrize(("wrap", "wraps"), [(HALF_WRAP, 0), (WRAP, 1)])

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_runs import ROOT, Bench, needs_twin
+from board_runs import Bench, needs_twin
 from echostep.board import messages as m
 from echostep.board.frames import encode
 from echostep.board.reports import SUBSCRIBE, BoardReports
-from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import Severity, board_findings, expected_rates, rate_findings
@@ -21,6 +20,7 @@ from echostep_app.board.subscription import BoardSubscription
 from echostep_app.commissioning.diagnosis import Diagnosis, judge_board
 from echostep_app.commissioning.probe import ProbeResult
 from echostep_app.output.terminal import findings
+from walks import PLAN
 
 CONFIGURATION = m.Configuration(0, 0xFF, m.Schedule.CONCURRENT, 200, 10, m.PressureMode.HIGH_SPEED)
 
@@ -133,8 +133,7 @@ def test_maxsonars_are_expected_to_ping_less_often() -> None:
 
 
 def test_the_live_view_says_it_too() -> None:
-    plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-    tracker = Tracker(plan)
+    tracker = Tracker(PLAN)
     said: list[m.Message] = [CONFIGURATION, status(healthy=0x3F, errors_pressure=4, fault_pressure=m.Fault.EEPROM)]
     for k, message in enumerate(said):
         tracker.feed(Chunk(BOARD, k, encode(message, k)))

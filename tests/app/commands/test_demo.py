@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ELF, ROOT, TWIN, needs_twin
-from command_line import echostep
-from echostep.plan import Door, Plan, Room, load_plan
+from board_runs import ELF, TWIN, needs_twin
+from command_line import echostep, sha_of
+from echostep.plan import Door, Plan, Room
 from echostep.recording import open_recording
 from echostep_app.guidance.tours import room_tour
 from echostep_app.scorecard.track_columns import load_path
@@ -20,15 +20,7 @@ from echostep_app.session.runs import demo
 from echostep_app.session.session import open_browser
 from echostep_simulation.scenario import DEMO_WAYPOINTS, start_of
 from echostep_simulation.world.tower import tower
-
-PLAN_FILE = ROOT / "host/core/echostep/plans/demo.json"
-PLAN = load_plan(PLAN_FILE)
-
-
-def sha_of(text: str) -> str:
-    found = re.search(r"sha256 ([0-9a-f]{16})", text)
-    assert found, text
-    return found[1]
+from walks import DEMO
 
 
 @pytest.fixture
@@ -55,7 +47,7 @@ def test_the_pace_changes_no_bit_and_the_summary_has_lines_of_its_own(tmp_path: 
     )
     assert again, lines[-1]
     assert Path(again[2]).samefile(tmp_path / "b/walk.mcap")
-    assert Path(again[3]).samefile(PLAN_FILE)
+    assert Path(again[3]).samefile(DEMO)
     assert "To see the walk again" not in fast.stdout  # nothing was to be seen
     for word in ("error: mean", "95 % ellipse:", "estimates: ", "files: "):
         assert [line for line in lines if line.startswith(word)], word
@@ -92,7 +84,7 @@ def with_rooms(plan: Plan) -> Plan:
 
 @pytest.mark.slow
 def test_a_demo_on_another_plan_walks_through_its_rooms(tmp_path: Path) -> None:
-    tree = json.loads((ROOT / "host/core/echostep/plans/demo.json").read_text())
+    tree = json.loads(DEMO.read_text())
     tree["levels"][0]["rooms"] = [r for r in tree["levels"][0]["rooms"] if r["name"] in ("Office 1", "Store")]
     (tmp_path / "plan.json").write_text(json.dumps(tree))
     done = echostep("demo", "--headless", "--plan", tmp_path / "plan.json", "--out", tmp_path / "out")
@@ -127,7 +119,7 @@ def test_the_kit_of_2026_ends_within_the_figures_of_the_papers_kit(tmp_path: Pat
     assert share, done.stdout
     assert float(mean[1]) <= 0.10
     assert int(share[1]) >= 93
-    again = echostep("replay", tmp_path / "a" / "walk.mcap", "--plan", PLAN_FILE, "--headless", "--out", tmp_path / "b")
+    again = echostep("replay", tmp_path / "a" / "walk.mcap", "--plan", DEMO, "--headless", "--out", tmp_path / "b")
     assert sha_of(again.stdout) == sha_of(done.stdout)
 
 

@@ -9,9 +9,10 @@ import re
 import socket
 import subprocess
 import sys
-import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +33,9 @@ from echostep_app.ports.udp import BYTES_A_SECOND
 from echostep_app.session.runs import line_foot
 from echostep_app.session.runs.line_foot import LineFoot, port_of
 from echostep_app.session.runs.live_lines import LONGEST_LINE, LineChunks, LineReader
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from free_ports import free_port
-from players import pseudo_terminal
+from players import playing, pseudo_terminal
 from waiting import ran, until
 
 HEADER = "t_s,ax,ay,az,gx,gy,gz"
@@ -51,7 +52,7 @@ for line in open(sys.argv[1]):
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of a simulated walk of two steps, without most of the time that the foot stands."""
     file = tmp_path_factory.mktemp("lines") / "imu.csv"
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=2), 100, rng=np.random.default_rng(1))
+    t_s, accel, gyro = walking(2)
     kept = (t_s > 1.5) & (t_s < t_s[-1] - 1.5)
     np.savetxt(file, np.column_stack([t_s, accel, gyro])[kept], delimiter=",", header=HEADER, comments="", fmt="%.9g")
     return file
@@ -103,25 +104,21 @@ def test_each_kind_of_port_gives_the_samples(kind: Callable[[], object], walk: P
     with kind() as (port, send):  # type: ignore[attr-defined]
         foot = f"lines:{port}#{HEADER}"
         with closing(SerialPorts({LINES: str(port_of(foot))}, {LINES: 115200})) as ports:
-            over = threading.Event()
+            coming = iter(sent)
 
             def play() -> None:
-                for line in sent:
-                    if over.wait(pace_s):
-                        return
+                time.sleep(pace_s)
+                for line in islice(coming, 1):
                     send(line)
 
-            player = threading.Thread(target=play)
-            player.start()
-            found = LineFoot(ports, foot)
-            reader, heard = MtxReader(), []
-            for chunk in found.with_samples(ports.chunks()):
-                if chunk is not None and chunk.port == MTX:
-                    heard.extend(reader.feed(chunk.data))
-                if len(heard) == len(sent):
-                    ports.stop()
-            over.set()
-            player.join()
+            with playing(play):
+                found = LineFoot(ports, foot)
+                reader, heard = MtxReader(), []
+                for chunk in found.with_samples(ports.chunks()):
+                    if chunk is not None and chunk.port == MTX:
+                        heard.extend(reader.feed(chunk.data))
+                    if len(heard) == len(sent):
+                        ports.stop()
     imu = load_foot(walk)
     assert found.rate_hz == pytest.approx(100.0, rel=1e-3)
     assert np.allclose([sample.accel for sample in heard], imu.accel, rtol=1e-5, atol=1e-5)

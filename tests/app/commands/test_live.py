@@ -19,23 +19,17 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import needs_twin, tool
-from command_line import PROGRAM, echostep, interrupt_after
+from board_runs import needs_twin
+from command_line import PROGRAM, echostep, interrupt_after, sha_of
 from echostep.errors import EchostepError
 from echostep.plan import load_plan
 from echostep.recording import open_recording
 from echostep_app.ports.serial_ports import SerialPorts
 from echostep_app.session.last_place import read_kept
-from players import pseudo_terminal
+from players import pseudo_terminal, walking_twin
 from snapshots import expect
 from waiting import PATIENCE_S, until
 from walks import DEMO as PLAN
-
-
-def sha_of(text: str) -> str:
-    found = re.search(r"sha256\s+([0-9a-f]{16})", text)
-    assert found, text
-    return found[1]
 
 
 @pytest.mark.long
@@ -49,10 +43,7 @@ def test_a_live_run_replays_to_identical_estimates(
     place = {"x_m": 2.0, "y_m": 7.5, "sd_m": 0.1, "level": 0, "air": None}
     kept = {"utc": datetime.now(UTC).isoformat(), "plan_sha256": load_plan(PLAN).digest, "board": "", "place": place}
     (tmp_path / "live/last.json").write_text(json.dumps(kept))
-    twin = subprocess.Popen([*tool("twin.run"), "--out", tmp_path], stdout=subprocess.PIPE, text=True)
-    try:
-        assert twin.stdout is not None
-        board, mtx = (twin.stdout.readline().split()[1] for _ in range(2))
+    with walking_twin(tmp_path) as (board, mtx):
         interrupt_after(10, monkeypatch)
         live = echostep(
             "live",
@@ -67,11 +58,6 @@ def test_a_live_run_replays_to_identical_estimates(
             "--seconds",
             PATIENCE_S,
         )
-    finally:
-        twin.send_signal(signal.SIGINT)
-        twin.wait(timeout=PATIENCE_S)
-        assert twin.stdout is not None
-        twin.stdout.close()
     assert live.returncode == 0, live.stderr
     rows = list(csv.DictReader((tmp_path / "live/track.csv").read_text().splitlines()))
     assert len(rows) >= 10
@@ -98,8 +84,6 @@ TWO_PORTS = ("--board", "x", "--mtx", "y")
 MISTAKES: dict[str, list[object]] = {
     "no such recording": ["replay", "none.mcap", "--plan", PLAN],
     "a file that is no recording": ["replay", __file__, "--plan", PLAN],
-    "no such plan": ["live", "--plan", "none.json", *TWO_PORTS],
-    "no such port": ["live", "--plan", PLAN, "--board", "/dev/no-such-port", "--mtx", "y"],
     "no such kind of port": ["live", "--plan", PLAN, "--board", "nonsense://x", "--mtx", "y"],
     "a start without heading": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2"],
     "a start of no number": ["live", "--plan", PLAN, *TWO_PORTS, "--start", "1,2,nan"],

@@ -28,10 +28,9 @@ from echostep_studies.simulation.devices.mtx_setup import FACTORY, MtxDevice
 from players import babbling_port, pseudo_terminal, python_board
 from team.team_broker import MOSQUITTO, Broker
 from waiting import PATIENCE_S
+from walks import DEMO, WALK
 from xsens.mt_lines import on_a_terminal
 
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
-WALK = ROOT / "tests/captures/walk.mcap"
 PAGE = ROOT / "host/docs/mistakes.md"
 Finished = subprocess.CompletedProcess[str]
 ROWS = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M))  # what is printed, by mistake
@@ -39,7 +38,7 @@ ROWS = dict(re.findall(r"^\| ([^|]+) \| `([^`]+)`", PAGE.read_text(), flags=re.M
 Mistake = Callable[[Path, pytest.MonkeyPatch], dict[str, str]]
 
 
-def live(folder: Path, *arguments: object, plan: object = PLAN, **names: object) -> dict[str, str]:
+def live(folder: Path, *arguments: object, plan: object = DEMO, **names: object) -> dict[str, str]:
     """What `live` prints as its error, which is one line, and the names of what differs."""
     done = echostep("live", "--plan", plan, "--headless", "--out", folder / "out", "--seconds", PATIENCE_S, *arguments)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stdout + done.stderr
@@ -89,7 +88,7 @@ def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
     patch.setattr("echostep_app.session.runs.live.print_notices", ending)
     with pseudo_terminal() as (_, port):
         done = echostep(
-            "live", "--plan", PLAN, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",
+            "live", "--plan", DEMO, "--board", port, "--headless", "--out", folder, "--publish", url, "--name", "anna",
             "--seconds", PATIENCE_S,
         )  # fmt: skip
     return {"said": goes_on(done), "URL": url}
@@ -98,7 +97,7 @@ def no_broker(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
 def publish_walk(folder: Path, url: str, *more: str) -> Finished:
     """A replay that publishes to this URL."""
     return echostep(
-        "replay", WALK, "--plan", PLAN, "--headless", "--out", folder, "--publish", url, "--name", "anna", *more
+        "replay", WALK, "--plan", DEMO, "--headless", "--out", folder, "--publish", url, "--name", "anna", *more
     )
 
 

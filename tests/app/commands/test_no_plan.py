@@ -14,10 +14,11 @@ from command_line import echostep
 from echostep.height.height_filter import RelativeHeight
 from echostep.height.levels import HeightChange
 from echostep.plan import NO_PLAN
-from echostep_app.session.metadata import run_metadata, start_recording
+from echostep_app.session.metadata import run_metadata
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
 from page.frames import PLAN
+from recording.damages import write_recording
 
 
 @pytest.mark.slow
@@ -25,10 +26,8 @@ def test_a_walk_without_a_plan_is_tracked_and_led_back(tmp_path: Path) -> None:
     """Twenty metres along the corridor and back: the walk ends where it began, and the way back is said."""
     scenario = Scenario(PLAN, ((2.0, 7.5), (22.0, 7.5), (2.4, 7.5)), 4, PythonBoard(4))
     metadata = run_metadata(NO_PLAN, NO_PLAN.start, 4, "without a plan")
-    with start_recording(tmp_path / "walk.mcap", metadata) as recorder:
-        for chunk in scenario.chunks():
-            recorder.write(chunk)
-    replay = ("replay", str(recorder.path), "--headless")
+    write_recording(tmp_path / "walk.mcap", scenario.chunks(), metadata)
+    replay = ("replay", "walk.mcap", "--headless")
     done = echostep(*replay, "--out", "first", "--guide", "exit", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "first/track.csv").read_text().splitlines()))

@@ -7,27 +7,24 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import typer.main
 
-from board_runs import ROOT
 from command_line import echostep
 from echostep.offline.imu_csv import Imu
 from echostep_app.cli import app
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from offline.imu_files import write
 from plan.drawings.drawn_houses import write_house
-from walks import DEMO
+from walks import DEMO, WALK
 
-WALK = ROOT / "tests/captures/walk.mcap"
 KEPT = b"of an earlier run\n"
 
 
 @pytest.fixture(scope="module")
 def imu() -> Imu:
     """A simulated walk of twelve steps."""
-    return Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
+    return Imu(*walking(12))
 
 
 def commands_with_out(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:

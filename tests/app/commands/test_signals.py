@@ -10,7 +10,6 @@ import pty
 import select
 import signal
 import subprocess
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -23,7 +22,7 @@ from echostep.recording import MCAP_MAGIC, open_recording
 from echostep_app.interruption import end_by_signals, holding_signals, is_asked, sleep, wait_for
 from echostep_app.recording.recorder import Recorder
 from operation.crowd import child_cpu_s
-from players import python_board
+from players import playing, python_board
 from waiting import PATIENCE_S, until
 from walks import DEMO as PLAN
 
@@ -59,27 +58,16 @@ def live_on_a_terminal(
 @contextlib.contextmanager
 def terminal_read(terminal: int) -> Iterator[Callable[[], None]]:
     """Reads what the program prints, so that it does not wait for the terminal, until the function is called that closes it."""
-    over = threading.Event()
 
     def read() -> None:
-        while not over.is_set():
-            if select.select([terminal], [], [], 0.05)[0]:
-                with contextlib.suppress(OSError):  # EIO: the program has ended
-                    os.read(terminal, 1 << 16)
+        if select.select([terminal], [], [], 0.05)[0]:
+            with contextlib.suppress(OSError):  # EIO: the program has ended
+                os.read(terminal, 1 << 16)
 
-    reader = threading.Thread(target=read)
-    reader.start()
-
-    def close() -> None:
-        if not over.is_set():
-            over.set()
-            reader.join()
-            os.close(terminal)
-
-    try:
-        yield close
-    finally:
-        close()
+    with contextlib.ExitStack() as reading:
+        reading.callback(os.close, terminal)
+        reading.enter_context(playing(read))
+        yield reading.close
 
 
 @pytest.mark.long
@@ -138,22 +126,16 @@ def test_an_interrupt_that_is_dropped_ends_the_run_all_the_same(
 
 def test_a_held_signal_ends_a_wait_and_a_second_ends_at_once() -> None:
     """As in a replay at the speed of the walk, over an hour in which the computer slept."""
-    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
     end_by_signals()
-    try:
-        with holding_signals():
-            assert not is_asked()
+    with holding_signals():
+        assert not is_asked()
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            sleep(PATIENCE_S)
+        with pytest.raises(KeyboardInterrupt):
+            wait_for(lambda: None, PATIENCE_S)
+        with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-            with pytest.raises(KeyboardInterrupt):
-                sleep(PATIENCE_S)
-            with pytest.raises(KeyboardInterrupt):
-                wait_for(lambda: None, PATIENCE_S)
-            with pytest.raises(KeyboardInterrupt):
-                signal.raise_signal(signal.SIGINT)
-    finally:
-        end_by_signals()  # forgets the two
-        for number, handler in handlers:
-            signal.signal(number, handler)
 
 
 def test_a_wait_gives_the_first_value_and_none_after_the_longest_time() -> None:

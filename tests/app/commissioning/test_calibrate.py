@@ -16,13 +16,12 @@ import pytest
 from numpy.typing import NDArray
 from rich.console import Console
 
-from board_runs import ROOT, quiet_rows
+from board_runs import quiet_rows
 from command_line import echostep
 from echostep.board import messages as m
 from echostep.board.calibration import GyroSettings, gyro_rates
 from echostep.errors import EchostepError
 from echostep.legs.kinematics import LegLengths
-from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.settings import Settings, parse_settings
 from echostep_app.commissioning.calibrate import STILL_S, TURN_S, WALK_S, Ports, Wearer, calibrate, write_sections
@@ -34,6 +33,7 @@ from echostep_simulation.people.walker import Person, walk
 from echostep_studies.simulation.devices.rehearsal import Act, Rehearsal
 from players import pseudo_terminal, python_board, some_noise
 from snapshots import expect, refusal
+from walks import PLAN
 
 COUNT_RAD_S = math.radians(0.2439)
 
@@ -256,7 +256,7 @@ def test_mistakes_end_with_one_line(tmp_path: Path) -> None:
 def test_the_rehearsal_of_the_twin_calibrates_everything() -> None:
     """What the wearer of `make twin STILL=1` does, as the Python board reports it, without waiting for it."""
     board = PythonBoard()
-    acts = Rehearsal(load_plan(ROOT / "host/core/echostep/plans/demo.json"), 1, board)
+    acts = Rehearsal(PLAN, 1, board)
     heard_in: dict[Act, ProbeResult] = {}
     for act, seconds in ((Act.STAND, STILL_S), (Act.TURN, TURN_S), (Act.WALK, WALK_S)):
         running = _Probe(SimpleNamespace(notices=[]), {BOARD: "x"}, check_gyros=False)  # type: ignore[arg-type]

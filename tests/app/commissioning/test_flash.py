@@ -25,7 +25,7 @@ from echostep.board.frames import encode
 from echostep_app.commissioning.flash import check_digest, check_hex
 from players import pseudo_terminal
 from snapshots import expect, refusal
-from waiting import PATIENCE_S, ran
+from waiting import PATIENCE_S, ran, until
 
 SHIPPED = ROOT / "host/app/echostep_app/firmware/echostep.hex"
 AVRDUDE = """#!/bin/sh
@@ -89,8 +89,7 @@ def board(link: Path, log: Path, obeys: bool = True) -> Iterator[None]:
 
     thread = threading.Thread(target=play)
     thread.start()
-    while not link.is_symlink():
-        time.sleep(0.01)
+    until(link.is_symlink)
     try:
         yield
     finally:

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import Connector, Level, Plan, load_plan
+from echostep.plan import Connector, Level, Plan
 from echostep_app.guidance.cues import NEVER_KNOWN, CueKind, Guide, arrow_sign, describe_cue
 from echostep_app.plan.polyline import along, nearest, way_m
 from echostep_app.plan.routing import BODY_M, Route, RoutePlace, Routes, Stretch
-from walks import DEMO
+from walks import PLAN
 
 LINE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
 HERE = Estimate(0.0, 0.0, 0.0, 0.01, 0.0, 0.01, 0.0, 0.05, 0, TrackStatus.TRACKING)
@@ -166,10 +166,9 @@ def test_the_arrow_is_relative_to_the_heading() -> None:
 
 
 def test_ways_keep_off_the_walls_and_reach_every_room() -> None:
-    plan = load_plan(DEMO)
-    routes, walls = Routes(plan), plan.levels[0].walls
+    routes, walls = Routes(PLAN), PLAN.levels[0].walls
     start = RoutePlace(2.0, 7.5)
-    for room in plan.levels[0].rooms:
+    for room in PLAN.levels[0].rooms:
         way = routes.way(start, RoutePlace(*room.at_m))
         line = way.stretches[0].line_m
         assert np.allclose(line[-1], room.at_m)
@@ -210,9 +209,8 @@ def test_the_way_goes_round_a_wall_between_two_flights_of_stairs(connectors: int
 
 
 def test_who_leaves_the_way_gets_another_one_around_the_walls() -> None:
-    plan = load_plan(DEMO)
-    routes = Routes(plan)
-    goal = plan.levels[0].rooms[3].at_m
+    routes = Routes(PLAN)
+    goal = PLAN.levels[0].rooms[3].at_m
     again = partial(routes.way, end=RoutePlace(*goal))
     g = Guide(again(RoutePlace(2.0, 7.5)), again=again)
     g.cue(at(0, 2.0, 7.5))

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beacons.beacon_walk import SEED, Walk, beacon_walk, demo
+from beacons.beacon_walk import SEED, Walk, beacon_walk
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.ports.chunks import GATEWAY, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun, destination
 from echostep_app.plan.routing import EXIT, RoutePlace
-from walks import DEMO
+from walks import DEMO, PLAN
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +65,12 @@ def test_a_place_that_no_way_leads_to_is_told(walk: Walk) -> None:
 
 
 def test_destinations_are_rooms_or_places() -> None:
-    plan = demo()
-    assert destination("office 2", plan) == RoutePlace(9.4, 12.2)
-    assert destination("3,2", plan) == RoutePlace(3.0, 2.0)
-    assert destination("exit", plan) == EXIT
+    assert destination("office 2", PLAN) == RoutePlace(9.4, 12.2)
+    assert destination("3,2", PLAN) == RoutePlace(3.0, 2.0)
+    assert destination("exit", PLAN) == EXIT
     for wrong in ("kitchen", "1,2,9", "nan,1", "1,2,3,4"):
         with pytest.raises(EchostepError, match="Office 1"):
-            destination(wrong, plan)
+            destination(wrong, PLAN)
 
 
 def test_simulated_gateway_speaks_to_a_port_that_nobody_listens_to(walk: Walk, tmp_path: Path) -> None:

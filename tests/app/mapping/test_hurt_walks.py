@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from command_line import echostep
 from echostep.arrays import Floats
 from echostep.path import MeasuredSegment, PathSegment
@@ -19,23 +18,22 @@ from echostep.ports.chunks import Chunk
 from echostep_app.mapping.mapper import map_walk
 from echostep_app.mapping.plan import plan_of
 from echostep_app.plan.writer import plan_json
-from echostep_app.session.metadata import run_metadata, start_recording
+from echostep_app.session.metadata import run_metadata
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import demo_scenario
 from echostep_studies.bench.tours import clearance_m
+from recording.damages import write_recording
+from walks import PLAN
 
 pytestmark = pytest.mark.slow
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 HEADING_RAD = 0.5 * math.pi
 
 
 def record(path: Path, chunks: list[Chunk], **fields: str) -> Path:
     """A recording of these chunks that begins at the demo's start; `fields` replace recorded ones."""
-    with start_recording(path, run_metadata(NO_PLAN, PLAN.start, 4, "no plan") | fields) as recorder:
-        for chunk in chunks:
-            recorder.write(chunk)
-    return recorder.path
+    write_recording(path, chunks, run_metadata(NO_PLAN, PLAN.start, 4, "no plan") | fields)
+    return path
 
 
 @pytest.fixture(scope="module")

@@ -6,16 +6,16 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from command_line import echostep
 from echostep.legs.trunk_path import rotated_segment
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import NO_PLAN, Pose, load_plan
+from echostep.plan import NO_PLAN, Pose
 from echostep_app.mapping.graph.graph import Closure, contradicted
 from echostep_app.mapping.growing import GrowingMap
 from echostep_app.mapping.mapper import Mapped, map_walk
@@ -23,17 +23,17 @@ from echostep_app.mapping.plan import plan_of
 from echostep_app.mapping.walls.drawing import Drawing, draw
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.places.gaps import door_gaps
-from echostep_app.session.metadata import run_metadata, start_recording
+from echostep_app.session.metadata import run_metadata
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import DEMO_WAYPOINTS, demo_scenario
 from echostep_studies.bench.sites import Site
-from echostep_studies.bench.tours import clearance_m
 from echostep_studies.bench.walks import SimulatedWalk, simulate
 from echostep_studies.noplan.judgement import known_start, path_columns
+from mapping.graph.test_walk_levels import away_m
+from recording.damages import write_recording
+from walks import PLAN
 
 pytestmark = pytest.mark.slow
-
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 
 
 @pytest.fixture(scope="module")
@@ -56,10 +56,7 @@ def test_the_office_is_drawn(walk: SimulatedWalk, mapped: Mapped) -> None:
     walls = plan.levels[0].walls
     length = np.hypot(*(walls[:, 2:] - walls[:, :2]).T)
     assert length.sum() > 80.0
-    shares = np.linspace(0.0, 1.0, 11)[:, None, None]
-    points = (walls[:, :2] + shares * (walls[:, 2:] - walls[:, :2])).reshape(-1, 2)
-    away = np.array([clearance_m(x, y, PLAN.levels[0].solid) for x, y in points.tolist()])
-    assert np.quantile(away, 0.9) < 0.2
+    assert np.quantile(away_m(walls, PLAN.levels[0].solid), 0.9) < 0.2
     assert sum(door.state == "open" for door in plan.levels[0].doors) >= 2
     assert check_plan(plan) == []
     assert plan.uncertainty_m is not None
@@ -172,20 +169,16 @@ def beside(span_s: float) -> list[MeasuredSegment]:
 
 def test_a_recording_becomes_a_plan_that_tracks(tmp_path: Path) -> None:
     """`echostep map` of a recorded demo; the same walk is tracked on the drawing, and never lost, though uncertain at first: as the drawing is."""
-    scenario = demo_scenario(PLAN, 4, PythonBoard(4))
-    with start_recording(tmp_path / "walk.mcap", run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan")) as recorder:
-        for chunk in scenario.chunks():
-            recorder.write(chunk)
-    done = echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.png", cwd=tmp_path, ends=0)
+    path, scenario = tmp_path / "walk.mcap", demo_scenario(PLAN, 4, PythonBoard(4))
+    write_recording(path, scenario.chunks(), run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan"))
+    done = echostep("map", path, "-o", "plan.json", "--picture", "plan.png", cwd=tmp_path, ends=0)
     assert "returns to known places" in done.stdout
     assert "picture: plan.png\n" in done.stdout
     assert (tmp_path / "plan.png").stat().st_size > 10_000
     echostep("plan", "check", "plan.json", cwd=tmp_path, ends=0)
-    tracked = echostep(
-        "replay", recorder.path, "--plan", "plan.json", "--headless", "--out", "again", cwd=tmp_path, ends=0
-    )
+    tracked = echostep("replay", path, "--plan", "plan.json", "--headless", "--out", "again", cwd=tmp_path, ends=0)
     assert re.search(r"never lost|lost for 0 s of 85 s, uncertain for [0-4] s", tracked.stdout), tracked.stdout
-    echostep("map", recorder.path, "-o", "plan.json", "--picture", "plan.xyz", cwd=tmp_path, ends=2)
+    echostep("map", path, "-o", "plan.json", "--picture", "plan.xyz", cwd=tmp_path, ends=2)
 
 
 def test_a_recording_without_a_walk_is_refused(tmp_path: Path) -> None:
@@ -193,13 +186,10 @@ def test_a_recording_without_a_walk_is_refused(tmp_path: Path) -> None:
     (tmp_path / "empty.mcap").write_bytes(b"")
     refused = echostep("map", "empty.mcap", "-o", "plan.json", cwd=tmp_path)
     assert (refused.returncode, "no recorded bytes" in refused.stderr) == (2, True)
-    scenario = demo_scenario(PLAN, 4, PythonBoard(4))
-    with start_recording(tmp_path / "walk.mcap", run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan")) as recorder:
-        for chunk in scenario.chunks():
-            if chunk.t_arrival_ns > 3_000_000_000:
-                break
-            recorder.write(chunk)
-    refused = echostep("map", recorder.path, "-o", "plan.json", cwd=tmp_path)
+    path, chunks = tmp_path / "walk.mcap", demo_scenario(PLAN, 4, PythonBoard(4)).chunks()
+    early = takewhile(lambda chunk: chunk.t_arrival_ns <= 3_000_000_000, chunks)
+    write_recording(path, early, run_metadata(NO_PLAN, NO_PLAN.start, 4, "no plan"))
+    refused = echostep("map", path, "-o", "plan.json", cwd=tmp_path)
     assert (refused.returncode, "of steps in it" in refused.stderr) == (2, True)
     assert not (tmp_path / "plan.json").exists()
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from echostep.errors import EchostepError
 from echostep_app.offline.foot_files import load_foot
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 
 G = 9.80665
 
@@ -22,8 +22,7 @@ G = 9.80665
 @pytest.fixture(scope="module")
 def walk() -> np.ndarray:
     """A simulated walk of four steps: time, force, rate (n, 7)."""
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=4), 100, rng=np.random.default_rng(1))
-    return np.column_stack([t_s, accel, gyro])
+    return np.column_stack(walking(4))
 
 
 def table(path: Path, header: str, *columns: np.ndarray) -> Path:

@@ -18,7 +18,7 @@ from echostep_app.offline.floors.pressure_csv import load_pressures
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.foreign_columns import LOGGERS, OWN, Naming, parse_naming, read_header
 from echostep_app.offline.leg_csv import load_legs, load_pair
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from needs_data import data_or_skip
 
 G = 9.80665
@@ -29,8 +29,7 @@ PAIRS = Naming({"t_s": "time", **{f"a{a}": f"acc_{a}" for a in AXES}, **{f"g{a}"
 @pytest.fixture(scope="module")
 def table() -> np.ndarray:
     """A simulated walk of six steps: time, force, rate (n, 7)."""
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=6), 100, rng=np.random.default_rng(1))
-    return np.column_stack([t_s, accel, gyro])
+    return np.column_stack(walking(6))
 
 
 def write(path: Path, header: str, rows: np.ndarray, separator: str = ",", above: str = "") -> Path:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from echostep.errors import EchostepError
 from echostep.foot import walk_track
-from foot.foot_walks import MANNERS, any_rotation, course, samples
+from foot.foot_walks import any_rotation, walking
 
 NAMES = [f"{sensor}_{axis}" for sensor in ("acc", "gyr") for axis in "xyz"]
 RATE_HZ = 100
@@ -41,7 +41,7 @@ def data(walk: np.ndarray) -> pd.DataFrame:
 def test_the_track_has_the_shape_of_gaitmaps_methods(method: Any) -> None:
     """Any mounting; the given orientation is the first one."""
     mounting = any_rotation(np.random.default_rng(2))
-    _, accel, gyro = samples(course(MANNERS["walking"], steps=6), RATE_HZ, rng=np.random.default_rng(1))
+    _, accel, gyro = walking(6)
     walk = np.hstack([accel @ mounting.T, gyro @ mounting.T])
     plain = method().estimate(data(walk), sampling_rate_hz=RATE_HZ)
     track = walk_track(np.arange(len(walk)) / RATE_HZ, walk[:, :3], walk[:, 3:])
@@ -59,7 +59,7 @@ def test_the_track_has_the_shape_of_gaitmaps_methods(method: Any) -> None:
 
 
 def test_what_is_no_foots_walk_is_refused(method: Any) -> None:
-    _, accel, gyro = samples(course(MANNERS["walking"], steps=6), RATE_HZ, rng=np.random.default_rng(1))
+    _, accel, gyro = walking(6)
     with pytest.raises(EchostepError, match="look like g"):
         method().estimate(data(np.hstack([accel / 9.80665, gyro])), sampling_rate_hz=RATE_HZ)
     with pytest.raises(ValueError, match="never still"):

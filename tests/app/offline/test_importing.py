@@ -24,14 +24,14 @@ from echostep.xsens import MtxReader
 from echostep_app.offline.importing import import_imu, rate_of
 from echostep_app.page.elements.scene import TruePath, TruePosition
 from echostep_app.scorecard.truth import FIELD, load_truth, recorded_truth
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 from offline.imu_files import hall, write
 
 
 @pytest.fixture(scope="module")
 def walk() -> Imu:
     """A simulated walk of twelve steps."""
-    return Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
+    return Imu(*walking(12))
 
 
 def test_a_recording_holds_the_samples_and_the_gap(walk: Imu, tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ START = "1,2,90"
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated walk of twelve steps along y, its times from 7 s on; the truth beside it at 100 Hz, and at points 2 s apart."""
     folder = tmp_path_factory.mktemp("truth")
-    imu = Imu(*samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1)))
+    imu = Imu(*walking(12))
     imu = Imu(imu.t_s + BEGIN_S, imu.accel, imu.gyro)
     write(folder / "imu.csv", imu)
     hall(folder / "plan.json")

@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from board_runs import ROOT
@@ -21,7 +20,7 @@ from echostep_app.offline.leg_csv import load_legs
 from echostep_app.recording.capture_summary import summary
 from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
-from echostep_simulation.people.rolling_foot import MANNERS, course, samples
+from foot.foot_walks import walking
 
 CAPTURES = ROOT / "tests/captures"
 BOARD, MTX = ((CAPTURES / f"{name}.bin").read_bytes() for name in ("board", "mtx"))
@@ -54,7 +53,7 @@ def table(folder: Path, names: str, rows: list[list[str]], first: dict[int, str]
 
 
 def foot_rows() -> list[list[str]]:
-    t_s, accel, gyro = samples(course(MANNERS["walking"], 4), 100, rng=np.random.default_rng(3))
+    t_s, accel, gyro = walking(4, seed=3)
     return [[f"{v:.5f}" for v in (t, *a, *g)] for t, a, g in zip(t_s, accel, gyro, strict=True)]
 
 

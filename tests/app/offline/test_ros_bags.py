@@ -19,7 +19,7 @@ from echostep.errors import EchostepError
 from echostep.recording import Decoder, read_capture
 from echostep_app.offline.foot_files import load_foot
 from echostep_app.offline.foreign_columns import Naming
-from foot.foot_walks import MANNERS, course, samples
+from foot.foot_walks import walking
 
 STORAGES = [(plugin, store) for plugin in StoragePlugin for store in (Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY)]
 BEGIN_S = 1_700_000_000
@@ -30,8 +30,7 @@ Rows = dict[tuple[str, str], np.ndarray]  # of topic and type: time, values
 @pytest.fixture(scope="module")
 def walk() -> np.ndarray:
     """A simulated walk of twelve steps: time, force, rate (n, 7)."""
-    t_s, accel, gyro = samples(course(MANNERS["walking"], steps=12), 100, rng=np.random.default_rng(1))
-    return np.column_stack([t_s, accel, gyro])
+    return np.column_stack(walking(12))
 
 
 def bag(path: Path, rows: Rows, storage: Any = STORAGES[0], frames: str = "foot", begin_s: int = BEGIN_S) -> Path:

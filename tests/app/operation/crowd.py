@@ -7,8 +7,8 @@ import math
 import os
 import threading
 import time
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -19,6 +19,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from echostep_app.page.protocol import FRAME_S
 from echostep_app.team.messages.report import Position, encode
 from operation.teams import FLOORS, STOREYS, ServedTeam, Team
+from players import playing
 from team.team_reports import POSITION, report
 
 RATE_HZ = 10.0  # of each wearer
@@ -46,31 +47,30 @@ class Crowd:
             self._walk(t_s, range(wearers))
             team.receive()
         self.served = ServedTeam(team)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._walks = playing(self._step)
+        self._reported = 0
 
     def __enter__(self) -> Self:
         self.served.__enter__()
-        self._thread.start()
+        self._began_s = time.monotonic()
+        self._walks.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._thread.join()
+        self._walks.__exit__(None, None, None)
         self.served.__exit__()
 
-    def _run(self) -> None:
-        team, began_s, reported = self._team, time.monotonic(), 0
-        while not self._ended.wait(max(began_s + self.scenes * FRAME_S - time.monotonic(), 0.0)):
-            t_s = time.monotonic() - began_s
-            team.now_s, team.unix_s = began_s + t_s, team.unix_s + FRAME_S
-            due = int(t_s * RATE_HZ * self.wearers)
-            self._walk(t_s, (n % self.wearers for n in range(reported, due)))
-            cpu_s, reported = time.thread_time(), due
-            team.receive()
-            self.served.show()
-            self.busy_s += time.thread_time() - cpu_s
-            self.scenes += 1
+    def _step(self) -> None:
+        time.sleep(max(self._began_s + self.scenes * FRAME_S - time.monotonic(), 0.0))
+        team, t_s = self._team, time.monotonic() - self._began_s
+        team.now_s, team.unix_s = self._began_s + t_s, team.unix_s + FRAME_S
+        due = int(t_s * RATE_HZ * self.wearers)
+        self._walk(t_s, (n % self.wearers for n in range(self._reported, due)))
+        cpu_s, self._reported = time.thread_time(), due
+        team.receive()
+        self.served.show()
+        self.busy_s += time.thread_time() - cpu_s
+        self.scenes += 1
 
     def _walk(self, t_s: float, numbers: Iterable[int]) -> None:
         """Reports of these wearers."""
@@ -78,35 +78,28 @@ class Crowd:
             self._team.hear(f"wearer {n:03d}", walking(n, t_s, n % STOREYS))
 
 
-class Publishers:
+@contextmanager
+def publishing(url: str, wearers: int) -> Iterator[None]:
     """Wearers who report ten times a second to a broker, by one connection at QoS 0, until the end."""
+    client = paho.Client(CallbackAPIVersion.VERSION2)
+    client.connect("127.0.0.1", int(url.rpartition(":")[2]))
+    client.loop_start()
+    began_s, reported = time.monotonic(), 0
 
-    def __init__(self, url: str, wearers: int) -> None:
-        self._wearers, self._ended = wearers, threading.Event()
-        self._client = paho.Client(CallbackAPIVersion.VERSION2)
-        self._client.connect("127.0.0.1", int(url.rpartition(":")[2]))
-        self._client.loop_start()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+    def step() -> None:
+        nonlocal reported
+        time.sleep(0.01)
+        t_s = time.monotonic() - began_s
+        for k in range(reported, due := int(t_s * RATE_HZ * wearers)):
+            n, sequence = k % wearers, k // wearers + 1
+            made = report(f"wearer {n:03d}", sequence, position=walking(n, t_s, 0))
+            client.publish(f"echostep/red/{made.name}/estimate", encode(made))
+        reported = due
 
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._thread.join()
-        self._client.disconnect()
-        self._client.loop_stop()
-
-    def _run(self) -> None:
-        began_s, reported = time.monotonic(), 0
-        while not self._ended.wait(0.01):
-            t_s = time.monotonic() - began_s
-            for k in range(reported, due := int(t_s * RATE_HZ * self._wearers)):
-                n, sequence = k % self._wearers, k // self._wearers + 1
-                made = report(f"wearer {n:03d}", sequence, position=walking(n, t_s, 0))
-                self._client.publish(f"echostep/red/{made.name}/estimate", encode(made))
-            reported = due
+    with playing(step):
+        yield
+    client.disconnect()
+    client.loop_stop()
 
 
 class Terminal:

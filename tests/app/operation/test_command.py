@@ -20,23 +20,18 @@ from websockets.typing import Origin
 
 from command_line import PROGRAM, echostep
 from operation.teams import ServedTeam, whole_team
-from page.frames import opened_url
+from page.frames import next_frame, opened_url
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import POSITION, report
 from waiting import PATIENCE_S, until
-
-
-def header_of(raw: bytes) -> dict[str, Any]:
-    """The header of a frame."""
-    made: dict[str, Any] = json.loads(raw[4 : 4 + int.from_bytes(raw[:4], "little")])
-    return made
+from walks import DEMO
 
 
 @needs_broker
 def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
-        command = [*PROGRAM, "command", broker.url, "--plan", str(PLAN), "--port", "0", "--json"]
+        command = [*PROGRAM, "command", broker.url, "--plan", str(DEMO), "--port", "0", "--json"]
         command += ["--out", str(tmp_path / "operation.mcap")]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONUNBUFFERED": "1"}
         running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
@@ -50,7 +45,7 @@ def test_the_command_serves_what_a_tracker_reports(tmp_path: Path) -> None:
 
             def rows() -> Any:
                 box.offer(report("anna", position=replace(POSITION, protection_m=0.4)))
-                header = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+                header = next_frame(page)
                 page.send(json.dumps({"kind": "drawn", "seq": header["seq"]}))
                 return header["list"]
 
@@ -65,7 +60,7 @@ def test_the_table_in_a_file_ends_its_last_line(tmp_path: Path) -> None:
     """What comes behind it, as an error, has a line of its own."""
     nobody = "mqtt://127.0.0.1:9"  # the port `discard` [RFC 863]
     done = echostep(
-        "command", nobody, "--plan", PLAN, "--seconds", 0.2, "--no-page", "--out", tmp_path / "o.mcap", ends=0
+        "command", nobody, "--plan", DEMO, "--seconds", 0.2, "--no-page", "--out", tmp_path / "o.mcap", ends=0
     )
     assert done.stdout.endswith("no connection to the broker\n")
 
@@ -77,14 +72,14 @@ def test_other_sites_cannot_open_the_socket_and_hostile_requests_do_nothing() ->
             connect(url.replace("http", "ws", 1) + "socket", origin=Origin("http://evil.example")).__enter__()
         with opened_url(url) as page:
             page.recv(PATIENCE_S)
-            first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            first = next_frame(page)
             assert len(first["list"]) == 8
             hostile = ["", "[]", "{", '{"kind":"choose","id":-1}', '{"kind":"choose","id":"x"}', "[" * 1500]
             for text in [*hostile, '{"kind":"drawn","seq":1e99}', json.dumps({"kind": "choose", "id": 1 << 60})]:
                 page.send(text)
             assert until(lambda: served.page.server.counts.unknown == len(hostile) + 2)
             page.send(json.dumps({"kind": "choose", "id": first["list"][0]["id"]}))
-            chosen = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            chosen = next_frame(page)
             assert chosen["details"]["id"] == first["list"][0]["id"]
             assert chosen["trail"] == 0  # the page has it already
 
@@ -94,7 +89,7 @@ def test_a_page_that_draws_nothing_is_sent_two_frames_and_no_more() -> None:
         url = served.page.url
         with opened_url(url) as page:
             page.recv(PATIENCE_S)
-            first = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            first = next_frame(page)
             served.show()
             page.recv(PATIENCE_S)
             for _ in range(5):
@@ -102,6 +97,6 @@ def test_a_page_that_draws_nothing_is_sent_two_frames_and_no_more() -> None:
             served.team.pass_time(60.0)
             served.show()
             page.send(json.dumps({"kind": "drawn", "seq": first["seq"]}))
-            newest = header_of(page.recv(PATIENCE_S))  # type: ignore[arg-type]
+            newest = next_frame(page)
     assert newest["seq"] == first["seq"] + 2
     assert "silent" in newest["list"][2]["words"]  # it has the newest scene, not one of those that it missed

@@ -10,7 +10,6 @@ from typing import Any, Self
 
 import pytest
 
-from echostep.plan import load_plan
 from echostep_app.operation.command import Restorer, restore
 from echostep_app.operation.operation import Operation
 from echostep_app.operation.page import TablePage
@@ -25,20 +24,20 @@ from echostep_app.team.messages.report import ReportedAlarm
 from echostep_app.team.mqtt.publisher import Listener
 from operation.teams import TOWER, ServedTeam, whole_team
 from operation.test_table_page import shot, table
-from page.browser import LOCAL, looking, spot, violations, wait_for
-from page.frames import PLAN as DEMO
-from page.frames import scene
+from page.browser import looking, spot, violations, wait_for
+from page.frames import LOCAL, scene
 from team.network import box_to, feed_of
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, report
+from team.team_reports import report
 from waiting import until
+from walks import PLAN
 
 
 class Commander:
     """A commander as `echostep command` is one, without a terminal."""
 
     def __init__(self, url: str) -> None:
-        self.operation, self._inbox = Operation(load_plan(PLAN)), Inbox()
+        self.operation, self._inbox = Operation(PLAN), Inbox()
         self.page = TablePage(self.operation, "Simulated operation", Address(port=0))
         self.receiver = ListenerThread(Listener(parse_endpoint(url), ["echostep/+/+/+", ALL], self._inbox.put), print)
         self.page.feed.send = self.receiver.send
@@ -166,7 +165,7 @@ KINDS = ("cleared", "hazard", "meeting")
 
 
 def test_a_wearer_sees_the_marks_of_the_commanders(browser: Any) -> None:
-    mailbox = Mailbox(DEMO, "test", replay=False)
+    mailbox = Mailbox(PLAN, "test", replay=False)
     with PageServer(mailbox, LOCAL) as server:
         mailbox.publish(scene())
         page = looking(browser, server.url, "bright")

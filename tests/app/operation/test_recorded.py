@@ -20,8 +20,8 @@ from echostep_app.operation.recorded.record import decode_record
 from echostep_app.operation.recorded.tape import OperationTape, Reader, TapeHead
 from echostep_app.recording.repair import contents, edit
 from operation.teams import TOWER, Recording, Team, place, whole_team
-from team.team_reports import PLAN
 from waiting import until
+from walks import DEMO
 
 CAPTURES = ROOT / "tests/captures"
 
@@ -143,11 +143,11 @@ def test_what_is_no_record_is_none(data: bytes) -> None:
 
 def test_the_command_shows_a_recorded_operation_and_names_what_is_none(tmp_path: Path) -> None:
     path = whole_recording(tmp_path)
-    run = echostep("command", path, "--plan", PLAN, "--no-page", "--json")
+    run = echostep("command", path, "--plan", DEMO, "--no-page", "--json")
     assert {m["name"] for m in json.loads(run.stdout)["members"]} >= {"Kim", "Finn"}
     assert "another plan" in run.stderr
     junk = tmp_path / "junk.mcap"
     junk.write_bytes(b"junk")
     for wrong, why in ((junk, "no recorded bytes"), (CAPTURES / "walk.mcap", "no recorded operation")):
-        failed = echostep("command", wrong, "--plan", PLAN, "--no-page")
+        failed = echostep("command", wrong, "--plan", DEMO, "--no-page")
         assert (failed.returncode, why in failed.stderr) == (2, True)

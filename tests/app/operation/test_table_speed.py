@@ -19,13 +19,13 @@ from typing import Any, Self
 import pytest
 
 from command_line import PROGRAM
-from operation.crowd import Crowd, Publishers, Terminal, child_cpu_s
+from operation.crowd import Crowd, Terminal, child_cpu_s, publishing
 from operation.teams import STOREYS
 from operation.test_table_page import table
 from page.browser import wait_for
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN
 from waiting import until
+from walks import DEMO
 
 SPAN_S = 5.0
 SLOWER = 4.0  # a main thread so many times slower: what Lighthouse takes for a phone of the middle class
@@ -103,13 +103,13 @@ def test_frame_rate_of_the_command(browser: Any, tmp_path: Path) -> None:
     """The whole of it: a broker, `echostep command` with its table on a terminal of 50 lines, and 200 wearers, all on one floor."""
     ours, theirs = os.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 140, 0, 0))
-    with Broker(tmp_path) as broker, Publishers(broker.url, 200):
+    with Broker(tmp_path) as broker, publishing(broker.url, 200):
         command = [
             *PROGRAM,
             "command",
             broker.url,
             "--plan",
-            str(PLAN),
+            str(DEMO),
             "--port",
             "0",
             "--out",

@@ -15,10 +15,9 @@ from echostep_app.operation.page import TablePage
 from echostep_app.operation.recorded.tape import OperationTape
 from echostep_app.page.server import Address
 from operation.teams import TOWER, Recording, Team, place, whole_team
-from operation.test_command import header_of
 from operation.test_table_page import shot, table
 from page.browser import overflow, violations, wait_for
-from page.frames import opened_url
+from page.frames import header, opened_url
 from waiting import PATIENCE_S
 
 CLOCK = "document.querySelector('#clock').textContent"
@@ -52,27 +51,27 @@ def test_a_page_goes_back_and_on_and_cannot_act(tmp_path: Path) -> None:
                 received = page.recv(PATIENCE_S)
                 if isinstance(received, str):
                     continue
-                header = header_of(received)
-                ask(page, kind="drawn", seq=header["seq"])
-                if holds(header):
-                    return header
+                frame = header(received)
+                ask(page, kind="drawn", seq=frame["seq"])
+                if holds(frame):
+                    return frame
 
-        begin_s = frames_until(lambda header: header["play"]["playing"])["play"]["begin_s"]
+        begin_s = frames_until(lambda frame: frame["play"]["playing"])["play"]["begin_s"]
         ask(page, kind="play", playing=False)
         ask(page, kind="seek", t_s=1e6)
-        end = frames_until(lambda header: header["play"]["t_s"] == header["play"]["end_s"])
+        end = frames_until(lambda frame: frame["play"]["t_s"] == frame["play"]["end_s"])
         assert end["list"][0]["name"] == "Finn"
         assert len(end["list"]) == 8
         ask(page, kind="seek", t_s=begin_s + 20.0)
-        past = frames_until(lambda header: header["play"]["t_s"] == pytest.approx(begin_s + 20.0))
+        past = frames_until(lambda frame: frame["play"]["t_s"] == pytest.approx(begin_s + 20.0))
         assert {row["state"] for row in past["list"]} == {"tracking"}
         assert past["trail_from"] == 0 < past["trail"]
         numbers = {row["name"]: row["id"] for row in end["list"]}
         assert all(numbers[row["name"]] == row["id"] for row in past["list"])
         ask(page, kind="choose", id=numbers["Kim"])
-        assert frames_until(lambda header: header["details"])["details"]["history"]
+        assert frames_until(lambda frame: frame["details"])["details"]["history"]
         ask(page, kind="step", steps=1)
-        frames_until(lambda header: header["play"]["t_s"] == pytest.approx(begin_s + 30.0))
+        frames_until(lambda frame: frame["play"]["t_s"] == pytest.approx(begin_s + 30.0))
         ask(page, kind="acknowledge", id=numbers["Finn"], by="Ann")
         while not isinstance(answer := page.recv(PATIENCE_S), str):
             pass

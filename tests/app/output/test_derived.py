@@ -15,7 +15,7 @@ import pytest
 from mcap.reader import make_reader
 
 from echostep.localization import Estimate, digest
-from echostep.plan import Georeference, Plan, load_plan
+from echostep.plan import Georeference, Plan
 from echostep.ports.chunks import portion_of
 from echostep.recording import open_recording, utc_offset_ns
 from echostep.tracker import Tracker
@@ -25,7 +25,8 @@ from echostep_app.output.track_files import export
 from echostep_app.recording.recorder import Recorder
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
-from walks import DEMO, walk_chunks
+from recording.damages import write_recording
+from walks import DEMO, PLAN, walk_chunks
 
 TAY = Georeference(-2.978, 56.46, math.radians(30.0))
 
@@ -53,7 +54,7 @@ def tracked(out: Path | None, plan: Plan, most: int = 50) -> list[Estimate]:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Estimate]]:
     path = tmp_path_factory.mktemp("derived") / "walk.mcap"
-    return path, tracked(path, dataclasses.replace(load_plan(DEMO), georeference=TAY))
+    return path, tracked(path, dataclasses.replace(PLAN, georeference=TAY))
 
 
 def derived_of(path: Path) -> list[tuple[Any, Any, int, dict[str, Any]]]:
@@ -130,7 +131,7 @@ def test_steps_echoes_and_pressure_are_plausible(recorded: tuple[Path, list[Esti
 def test_a_recording_with_derived_messages_replays_to_the_same_estimates(recorded: tuple[Path, list[Estimate]]) -> None:
     path, estimates = recorded
     assert tuple(open_recording(path).chunks()) == walk_chunks()
-    assert digest(tracked(None, load_plan(DEMO), most=7)) == digest(estimates)
+    assert digest(tracked(None, PLAN, most=7)) == digest(estimates)
 
 
 def test_covariance_on_earth_is_the_turned_one() -> None:
@@ -157,9 +158,7 @@ def dated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def recorded_and_exported(folder: Path, clock: dict[str, str]) -> Path:
-    with Recorder(folder / "walk.mcap", {"seed": "3"} | clock) as recorder:
-        for chunk in walk_chunks(12.0):
-            recorder.write(chunk)
+    write_recording(folder / "walk.mcap", walk_chunks(12.0), {"seed": "3"} | clock)
     out = folder / "derived.mcap"
     export(folder / "walk.mcap", DEMO, out, lambda recording, on: tracker_of(recording, on, TrackingOptions(DEMO)))
     return out
@@ -175,7 +174,7 @@ def messages(path: Path) -> list[tuple[str, int, bytes]]:
 
 def replayed(path: Path) -> list[Estimate]:
     recording = open_recording(path)
-    tracker = tracker_of(recording, load_plan(DEMO), TrackingOptions(DEMO))
+    tracker = tracker_of(recording, PLAN, TrackingOptions(DEMO))
     return [e for portion in recording.portions() for e in tracker.take(portion)]
 
 

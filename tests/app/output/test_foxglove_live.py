@@ -24,17 +24,18 @@ from websockets.typing import Subprotocol
 
 from command_line import PROGRAM
 from echostep.errors import EchostepError
-from echostep.plan import Georeference, load_plan
+from echostep.plan import Georeference
 from echostep.ports.chunks import portion_of
 from echostep.recording import utc_offset_ns
 from echostep.tracker import Tracker
 from echostep_app.output.derived import Derived
 from echostep_app.output.foxglove import LOCATION, SCENE
 from echostep_app.output.foxglove_live import ALL_TOPICS, FoxgloveAddress, FoxgloveServer, parse_address
-from echostep_app.recording.recorder import DerivedMessage, Recorder
+from echostep_app.recording.recorder import DerivedMessage
 from free_ports import free_port
+from recording.damages import write_recording
 from waiting import PATIENCE_S, until
-from walks import DEMO, walk_chunks
+from walks import DEMO, PLAN, walk_chunks
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 MESSAGE = 0x01  # opcode of a binary message: subscription u32, time u64 in ns, payload [Foxglove, ws-protocol]
@@ -94,7 +95,7 @@ def viewing(url: str, topics: set[str]) -> Iterator[Viewer]:
 @pytest.fixture(scope="module")
 def derived() -> list[DerivedMessage]:
     """The messages of a walk on a plan by the Tay."""
-    tracker = Tracker(replace(load_plan(DEMO), georeference=Georeference(-2.978, 56.46, 0.5)), seed=1)
+    tracker = Tracker(replace(PLAN, georeference=Georeference(-2.978, 56.46, 0.5)), seed=1)
     maker, chunks = Derived(tracker), walk_chunks()
     portions = [portion_of(chunks[k : k + 50]) for k in range(0, len(chunks), 50)]
     return [message for portion in portions for message in maker.take(portion, tracker.take(portion))]
@@ -216,9 +217,7 @@ def test_a_replay_is_seen_by_a_viewer(tmp_path: Path) -> None:
     clock = {"started_utc": "2026-11-26T10:00:00.000+00:00", "started_ns": "0"}
     began_ns = utc_offset_ns(clock)
     assert began_ns
-    with Recorder(tmp_path / "walk.mcap", {"seed": "3"} | clock) as recorder:
-        for chunk in walk_chunks(5.0):
-            recorder.write(chunk)
+    write_recording(tmp_path / "walk.mcap", walk_chunks(5.0), {"seed": "3"} | clock)
     port = free_port()
     arguments = (
         "replay", tmp_path / "walk.mcap", "--plan", DEMO, "--headless", "--foxglove", port, "--start", "2,7.5,0", "--out", tmp_path,

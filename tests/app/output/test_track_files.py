@@ -27,11 +27,11 @@ from echostep_app.output.map_files import TrackOnPlan
 from echostep_app.output.track_files import FORMATS
 from echostep_app.output.track_files import export as write
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.recording.recorder import Recorder
 from echostep_app.recording.repair.contents import info
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
 from page.frames import told
+from recording.damages import write_recording
 from walks import DEMO, walk_chunks
 
 
@@ -39,9 +39,7 @@ from walks import DEMO, walk_chunks
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording, and a plan that lies by the Tay."""
     folder = tmp_path_factory.mktemp("export")
-    with Recorder(folder / "walk.mcap", {"seed": "3", "note": "a test"}) as recorder:
-        for chunk in walk_chunks():
-            recorder.write(chunk)
+    write_recording(folder / "walk.mcap", walk_chunks(), {"seed": "3", "note": "a test"})
     tree = json.loads(DEMO.read_text())
     tree["georeference"] = {"origin": [-2.978, 56.46], "rotation_deg": 30.0}
     (folder / "plan.json").write_text(json.dumps(tree))
@@ -186,9 +184,7 @@ def test_a_track_on_a_map_has_times(folder: Path, estimates: list[Estimate]) -> 
     assert "No time of day" in simulated.read_text()
     assert moments(simulated)[0].startswith("1970-01-01T00:00:0")
     clock = {"started_utc": "2026-11-21T10:00:00.000+00:00", "started_ns": "1000000000"}
-    with Recorder(folder / "live.mcap", {"seed": "3"} | clock) as recorder:
-        for chunk in walk_chunks():
-            recorder.write(chunk)
+    write_recording(folder / "live.mcap", walk_chunks(), {"seed": "3"} | clock)
     write(
         folder / "live.mcap",
         folder / "plan.json",

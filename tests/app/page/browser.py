@@ -17,21 +17,20 @@ from board_runs import ROOT
 from echostep.foot.steps import Step
 from echostep.localization import Estimate, Start
 from echostep.path import PathSegment
-from echostep.plan import Pose, load_plan
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_app.guidance.guided_run import GuidedRun
 from echostep_app.page.live import LivePage
-from echostep_app.page.server import Address
 from echostep_app.plan.routing import RoutePlace
 from echostep_simulation.devices.beacon_gateway import with_beacons
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import START_NS, demo_scenario
+from page.frames import LOCAL
 from waiting import PATIENCE_S, until
+from walks import PLAN
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
-LOCAL = Address(port=0)
 HELD_MS = 1200  # for which a button is held that a brush must not press
 SKIPPED = 500  # chunks in a portion before the page is opened
 SHOWN = (  # for the error of a test
@@ -205,6 +204,23 @@ def spot(page: Any, x_m: float, y_m: float) -> tuple[float, float]:
 def wait_for(page: Any, holds: str) -> None:
     """Until an expression holds (the page's own policy forbids Playwright's waiting)."""
     assert until(lambda: bool(page.evaluate(holds))), f"{holds}: {page.evaluate(SHOWN)}"
+
+
+def painted(page: Any, colour: str, x_m: float, y_m: float, within_px: int = 12) -> bool:
+    """Whether the canvas has a colour of the style within so many pixels of a place."""
+    return bool(
+        page.evaluate(
+            """([name, x, y, within]) => {
+                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
+                const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+                const { data } = canvas.getContext('2d').getImageData(sx - within, sy - within, 2 * within, 2 * within);
+                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
+                return false;
+            }""",
+            [colour, x_m, y_m, within_px],
+        )
+    )
 
 
 def picture(page: Any, name: str, tmp_path: Path) -> None:

@@ -23,8 +23,6 @@ import pytest
 from numpy.typing import NDArray
 from websockets.exceptions import InvalidMessage
 
-from board_runs import ROOT
-from echostep.plan import load_plan
 from echostep_app.commands.actions.beacon_player import simulate_gateway
 from echostep_simulation.devices.board import PythonBoard, Sent
 from echostep_simulation.scenario import Scenario
@@ -32,10 +30,9 @@ from free_ports import free_port
 from page.elements.test_page_guide import until
 from page.frames import opened_url
 from players import pseudo_terminal
-from walks import walk_chunks
+from walks import DEMO, PLAN, walk_chunks
 
 SEED = 3
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
 WALK = ((2.0, 7.5), (9.0, 7.5))
 PATIENCE_S = 180.0  # on a fresh clone the kernels are compiled first
 
@@ -76,9 +73,9 @@ def walking(beacons: str, truth: Path) -> Iterator[tuple[str, str]]:
     run = importlib.import_module("twin.run")
     with pseudo_terminal() as (ours, port):
         board, mtx = PortBoard(ours), run.PtyMtx()
-        scenario = Scenario(load_plan(PLAN), WALK, SEED, board)
+        scenario = Scenario(PLAN, WALK, SEED, board)
         # In step with the board, however late that is
-        arguments = (PLAN, truth, beacons, 2.0, 1.0, SEED, lambda: board.t_s)
+        arguments = (DEMO, truth, beacons, 2.0, 1.0, SEED, lambda: board.t_s)
         gateway = threading.Thread(target=simulate_gateway, args=arguments, daemon=True)
         walk_chunks(1.0)  # its kernels are compiled or loaded before the wearer walks
 
@@ -100,7 +97,7 @@ def live(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     beacons = f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
     with walking(beacons, tmp_path / "truth.csv") as (board, mtx):
         command = [
-            *(sys.executable, "-m", "echostep", "live", "--plan", PLAN, "--board", board, "--mtx", mtx, "--port", "0"),
+            *(sys.executable, "-m", "echostep", "live", "--plan", DEMO, "--board", board, "--mtx", mtx, "--port", "0"),
             *("--beacons", beacons, "--guide", "9,7.5", "--out", tmp_path / "live"),
         ]
         running = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -141,7 +138,7 @@ def test_a_guided_walk_among_beacons_is_seen_on_the_page(live: subprocess.Popen[
     cues = (tmp_path / "live/cues.csv").read_bytes()
     assert {row["kind"] for row in csv.DictReader(cues.decode().splitlines())} >= {"ahead", "arrived"}
     again = subprocess.run(
-        [sys.executable, "-m", "echostep", "replay", tmp_path / "live/walk.mcap", "--plan", PLAN, "--guide", "9,7.5",
+        [sys.executable, "-m", "echostep", "replay", tmp_path / "live/walk.mcap", "--plan", DEMO, "--guide", "9,7.5",
          "--headless", "--out", tmp_path / "again"],
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip

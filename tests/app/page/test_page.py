@@ -71,6 +71,7 @@ def test_no_text_breaks_the_parser(text: str) -> None:
         '"kind":"speed","times":32.1', '"kind":"step","steps":1.5', '"kind":"step","steps":9007199254740992', '"kind":"play","playing":1',
         '"kind":"met","name":""', '"kind":"go_to","x_m":1,"y_m":100000.1', '"kind":"go_to","x_m":1,"y_m":1,"level":1000',
         '"kind":"met","name":"' + 33 * "x" + '"', '"kind":"drawn"', '"kind":"undo","undo":0', '"seq":1',
+        '"kind":"call"', '"kind":"call","help":1', '"kind":"call","help":null',
     ],
 )  # fmt: skip
 def test_a_request_beyond_its_limits_is_none(text: str) -> None:

@@ -20,21 +20,21 @@ from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.plan.routing import RoutePlace
 from page.browser import (
-    LOCAL,
     LOOKS,
-    PLAN,
     Walk,
     demo_walk,
     looking,
     opened_page,
     overflow,
+    painted,
     picture,
     spot,
     violations,
     wait_for,
 )
-from page.frames import scene, served
+from page.frames import LOCAL, scene, served
 from waiting import until
+from walks import PLAN
 
 
 @pytest.mark.long
@@ -63,6 +63,7 @@ def test_nothing_keeps_anybody_out(browser: Any, look: str, tmp_path: Path) -> N
 SAME_PLAY = "['t_s', 'playing', 'times'].every((name) => echostep.last.play[name] === stood[name])"
 SHEET = "document.querySelector('#sheet-text').textContent"
 STILL = "!document.getAnimations().length"
+NEAR_PX = 40  # of a way
 
 
 def test_a_tap_and_a_drag_check_in(browser: Any, tmp_path: Path) -> None:
@@ -211,7 +212,7 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
         wait_for(page, "echostep.last.beacons.length > 5 && echostep.last.guidance.path.length > 1")
         wait_for(page, STILL)
         seen, path = page.evaluate(f"[{GUIDED}, echostep.last.guidance.path]")
-        colours = [ink_near(page, *place) for place in path[1:]]
+        colours = [painted(page, "goal", x, y, NEAR_PX) for x, y in path[1:]]
         found = violations(page)
         picture(page, "guide" if look == "bright" else "guide-wide", tmp_path)
         wide = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
@@ -233,23 +234,6 @@ def test_the_runs_guidance_and_its_beacons_are_seen(browser: Any, look: str, tmp
     assert all(colours)
     assert found == []
     assert (wide, outside) == (0, 0)
-
-
-def ink_near(page: Any, x_m: float, y_m: float) -> bool:
-    """Whether the canvas shows anything of the way's colour within a few pixels of a place."""
-    return bool(
-        page.evaluate(
-            """([x, y]) => {
-                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
-                const hex = getComputedStyle(document.documentElement).getPropertyValue('--goal').trim();
-                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
-                const { data } = canvas.getContext('2d').getImageData(sx - 40, sy - 40, 80, 80);
-                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
-                return false;
-            }""",
-            [x_m, y_m],
-        )
-    )
 
 
 def test_the_page_says_one_sentence_at_a_time_when_it_may(browser: Any) -> None:

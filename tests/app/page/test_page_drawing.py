@@ -27,8 +27,8 @@ from echostep_app.page.elements.drawn_walls import (
 )
 from echostep_app.page.live import LivePage
 from echostep_app.page.mailbox import Mailbox
-from page.browser import DESK, LOCAL, PHONE, demo_walk, loaded_page, overflow, picture, wait_for
-from page.frames import told
+from page.browser import DESK, PHONE, demo_walk, loaded_page, overflow, picture, wait_for
+from page.frames import LOCAL, told
 from waiting import until
 
 PORTION = 500

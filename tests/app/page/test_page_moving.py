@@ -23,7 +23,8 @@ from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import demo_scenario
-from page.browser import FRAMED, LOCAL, PICTURES, PLAN, READY, loaded_page, wait_for
+from page.browser import FRAMED, PICTURES, READY, loaded_page, wait_for
+from page.frames import LOCAL, PLAN
 
 NAME = "page.webp"
 TITLE = "A simulated walk"

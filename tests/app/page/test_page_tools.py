@@ -21,8 +21,8 @@ from echostep_app.page.elements.stream_rates import StreamRates
 from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.over_time import OverTime
 from echostep_app.page.server import PageServer
-from page.browser import LOCAL, READY, loaded_page, overflow, picture, spot, violations, wait_for
-from page.frames import PLAN, scene, told
+from page.browser import READY, loaded_page, overflow, painted, picture, spot, violations, wait_for
+from page.frames import LOCAL, PLAN, scene, told
 from page.web.test_page_sizes import SIZES, UNREACHED
 from waiting import until
 
@@ -70,23 +70,6 @@ def looking(browser: Any, url: str, how: dict[str, Any] = DESK) -> Any:
     page.click("#play")
     wait_for(page, "!echostep.last.play.playing")
     return page
-
-
-def painted(page: Any, colour: str, x_m: float, y_m: float) -> bool:
-    """Whether the canvas has a colour of the style within 12 px of a place."""
-    return bool(
-        page.evaluate(
-            """([name, x, y]) => {
-                const canvas = document.querySelector('#canvas'), [sx, sy] = echostep.view.toScreen(x, y).map((v) => v * devicePixelRatio);
-                const hex = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-                const want = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
-                const { data } = canvas.getContext('2d').getImageData(sx - 12, sy - 12, 24, 24);
-                for (let k = 0; k < data.length; k += 4) if (want.every((v, c) => Math.abs(data[k + c] - v) < 6) && data[k + 3] > 250) return true;
-                return false;
-            }""",
-            [colour, x_m, y_m],
-        )
-    )
 
 
 def test_layers_are_left_out_and_stay_so(browser: Any, url: str) -> None:

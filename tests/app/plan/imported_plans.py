@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -14,13 +17,20 @@ from shapely.geometry import box as area
 from echostep.plan import Door, Georeference, Plan, Pose
 from echostep_app.plan.importers.connector_shapes import plan_of
 from echostep_app.plan.importers.drawn_level import ConnectorShape, DrawnLevel, room
-from echostep_app.plan.importers.report import ImportReport
+from echostep_app.plan.importers.formats import import_plan
+from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.writer import plan_json
 
 LON, LAT = 8.85, 53.11
 STOREY_M = 3.5
 FLOORS = ("Basement", "Ground floor", "First floor", "Second floor", "Third floor", "Fourth floor", "Attic")
 HALF_M = 0.1  # half the thickness of a wall
+
+
+def imported_file(path: Path, above: Sequence[Path] = (), **hints: Any) -> tuple[Plan, ImportReport]:
+    """The plan of a file, `above` being those of the higher levels, and what is told of it."""
+    report = ImportReport()
+    return import_plan(path, Hints(**hints), above, report), report
 
 
 def across(y: float, x0: float, x1: float, doors: tuple[float, ...] = ()) -> list[Polygon]:

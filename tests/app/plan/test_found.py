@@ -19,18 +19,12 @@ from echostep.errors import EchostepError
 from echostep.plan import Door, Plan, load_plan, parse_plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.georeference import EarthTransform
-from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import Hints, ImportReport
+from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.importers.summary import doors_in_gaps, size_m, summary
 from plan.drawings.drawn_houses import write_house
-from plan.imported_plans import seven_floors
+from plan.imported_plans import imported_file, seven_floors
 
 DEG = 1e-5  # degrees of the small houses on the Earth
-
-
-def imported(path: Path, **hints: object) -> tuple[Plan, ImportReport]:
-    report = ImportReport()
-    return import_plan(path, Hints(**hints), report=report), report  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("crs", "lon", "lat", "east", "north"), [
@@ -109,7 +103,7 @@ def test_elements_without_a_level_are_told(tmp_path: Path) -> None:
         for k, v in ((6, "no"), (7, "no"), (8, "yes"), (10, "yes"))
     )
     (tmp_path / "a.osm").write_text(osm(ROOM.format(REFS) + more))
-    said = " ".join(imported(tmp_path / "a.osm")[1].doubts)
+    said = " ".join(imported_file(tmp_path / "a.osm")[1].doubts)
     assert "2 indoor=yes have no level" in said
     assert "indoor=no" not in said
 
@@ -129,7 +123,7 @@ def clip_of(path: Path, corners: list[tuple[float, float]]) -> Path:
 
 
 def test_of_a_block_with_an_inverted_clip_the_part_outside_is_read(tmp_path: Path) -> None:
-    plan, _ = imported(clip_of(tmp_path, [(-1, -1), (12, 9)]))
+    plan, _ = imported_file(clip_of(tmp_path, [(-1, -1), (12, 9)]))
     assert size_m(plan.levels[0]) == pytest.approx((18.0, 8.0), abs=1e-3)
 
 
@@ -139,7 +133,7 @@ def test_a_binary_drawing_that_is_cut_is_refused(tmp_path: Path) -> None:
     for cut in (22, len(content) // 2, len(content) - 1):
         (tmp_path / "b.dxf").write_bytes(content[:cut])
         with pytest.raises(EchostepError, match=r"b\.dxf: "):
-            imported(tmp_path / "b.dxf")
+            imported_file(tmp_path / "b.dxf")
 
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -205,7 +199,7 @@ def test_walls_with_gaps_are_not_called_closed(tmp_path: Path) -> None:
         space.add_line(line[:2], line[2:], {"layer": "A-WALL"})
     space.add_text("Kitchen", dxfattribs={"layer": "ROOM", "height": 0.3, "insert": (3, 6.5)})
     doc.saveas(tmp_path / "a.dxf")
-    plan, report = imported(tmp_path / "a.dxf")
+    plan, report = imported_file(tmp_path / "a.dxf")
     said = "\n".join(summary(plan, report))
     assert "0 doors, 1 gap that people can pass, 1 room" in said
     assert "cannot be entered" not in said

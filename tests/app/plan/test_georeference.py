@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ROOT
-from echostep.plan import NO_PLAN, Georeference, load_plan
+from echostep.plan import NO_PLAN, Georeference
 from echostep_app.operation.words import shown_details
 from echostep_app.output.terminal import describe
 from echostep_app.page.mailbox import Mailbox
@@ -21,8 +20,8 @@ from echostep_app.team.messages.report import encode
 from echostep_app.team.roster import Roster
 from page.frames import next_frame, opened, scene, served, told
 from team.team_reports import POSITION, report
+from walks import PLAN
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 DEGREE_M = 111_320.0  # along a meridian
 
 
@@ -64,8 +63,7 @@ def test_no_georeference_no_globe() -> None:
     assert globe_of(replace(PLAN, georeference=None)) is None
 
 
-DEMO = ROOT / "host/core/echostep/plans/demo.json"
-PLACELESS = replace(load_plan(DEMO), georeference=None)
+PLACELESS = replace(PLAN, georeference=None)
 QUARTER = 0.5 * math.pi
 
 

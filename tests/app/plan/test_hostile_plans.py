@@ -26,14 +26,14 @@ from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.imdf.archive import FREE_BYTES, MOST_FILES, MOST_RATIO, Archive
 from echostep_app.plan.importers.limited import import_limited, open_limited
 from echostep_app.plan.importers.parsing import LARGEST_BYTES
-from echostep_app.plan.importers.report import ImportReport
 from echostep_app.plan.writer import plan_json, save_plan
-from echostep_app.recording.recorder import Recorder
 from echostep_app.scorecard.track_columns import load_path
 from echostep_app.scorecard.truth import load_truth
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
-from walks import DEMO, walk_chunks
+from plan.imported_plans import imported_file
+from recording.damages import write_recording
+from walks import DEMO, PLAN, walk_chunks
 
 SQUARE = ((0, 0, 4, 0), (4, 0, 4, 4), (4, 4, 0, 4), (0, 4, 0, 0))
 
@@ -53,9 +53,8 @@ def arc(radius: str) -> str:
 
 
 def test_unknown_entities_are_left_out(tmp_path: Path) -> None:
-    report = ImportReport()
-    file = drawing(tmp_path / "a.dxf", "0\nAEC_WALL\n5\n99\n8\nWalls\n10\n1.0\n")
-    assert len(import_plan(file, report=report).levels[0].walls) == len(SQUARE)
+    plan, report = imported_file(drawing(tmp_path / "a.dxf", "0\nAEC_WALL\n5\n99\n8\nWalls\n10\n1.0\n"))
+    assert len(plan.levels[0].walls) == len(SQUARE)
     assert sum("AEC_WALL" in what for what in report.left_out) == 1
 
 
@@ -188,11 +187,9 @@ def test_a_truth_that_a_power_failure_left_is_named(tmp_path: Path, left: bytes)
 def test_settings_nested_too_deeply_are_one_error(tmp_path: Path) -> None:
     with pytest.raises(EchostepError, match=r"deep\.toml: its values are nested too deeply"):
         parse_settings(DEEP, "deep.toml")
-    with Recorder(tmp_path / "a.mcap", {"settings_toml": DEEP}) as recorder:
-        for chunk in walk_chunks(1.0):
-            recorder.write(chunk)
+    write_recording(tmp_path / "a.mcap", walk_chunks(1.0), {"settings_toml": DEEP})
     with pytest.raises(EchostepError, match=r"a\.mcap: its values are nested too deeply"):
-        tracker_of(open_parts([tmp_path / "a.mcap"]), load_plan(DEMO), TrackingOptions(DEMO))
+        tracker_of(open_parts([tmp_path / "a.mcap"]), PLAN, TrackingOptions(DEMO))
 
 
 @pytest.mark.parametrize("number", ["1e308", "-1e308", "1.1e19"])
@@ -245,5 +242,5 @@ def test_a_name_of_two_lines_is_read() -> None:
 
 def test_a_plan_is_written_without_what_none_can_hold(tmp_path: Path) -> None:
     """An imported file may have any names."""
-    save_plan(replace(load_plan(DEMO), name="a\x07b\x1b[2J"), tmp_path / "plan.json")
+    save_plan(replace(PLAN, name="a\x07b\x1b[2J"), tmp_path / "plan.json")
     assert load_plan(tmp_path / "plan.json").name == "a b [2J"

@@ -8,18 +8,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from echostep.plan import Plan
-from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import Hints, ImportReport
 from plan import test_plan_importer_imdf as imdf
 from plan import test_plan_importer_osm as osm
-
-
-def counted(path: Path, **hints: Any) -> tuple[Plan, dict[str, int]]:
-    report = ImportReport()
-    return import_plan(path, Hints(**hints), report=report), report.left_out
+from plan.imported_plans import imported_file
 
 
 def sizes(plan: Plan) -> dict[str, int]:
@@ -58,8 +51,8 @@ def test_kinds_of_imdf(tmp_path: Path) -> None:
         imdf.feature("relationship", f"r{k}", None, category=kind) for k, kind in enumerate(("stairs", "traversal"))
     ]
     tree["relationship.geojson"] = {"type": "FeatureCollection", "features": joins}
-    plan, left_out = counted(imdf.folder(tmp_path / "venue", tree))
-    assert left_out == dict.fromkeys(others, 1) | {
+    plan, report = imported_file(imdf.folder(tmp_path / "venue", tree))
+    assert report.left_out == dict.fromkeys(others, 1) | {
         "fixture rug": 1, "fixture or kiosk without an area": 1, "unit without an area": 1, "relationship traversal": 1,
         "opening without a width (--doors 0.9 gives one)": 1,
     }  # fmt: skip
@@ -81,8 +74,8 @@ def test_kinds_of_openstreetmap(tmp_path: Path) -> None:
         {"type": "relation", "id": 50, "members": [], "tags": {"type": "site"}},
     ]
     (tmp_path / "house.json").write_text(json.dumps({"elements": elements}))
-    plan, left_out = counted(tmp_path / "house.json")
-    assert left_out == {
+    plan, report = imported_file(tmp_path / "house.json")
+    assert report.left_out == {
         "node that is no door, stairs or lift": 1, "door on no wall": 1, "lift on one level only": 1,
         "way that is no wall, room, corridor or stairs": 2, "room without level": 1, "relation that is no multipolygon": 1,
     }  # fmt: skip

@@ -8,7 +8,6 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from matplotlib.image import imread
 from typer.testing import CliRunner
 
 from echostep.errors import EchostepError
-from echostep.plan import Level, Plan, load_plan, parse_plan
+from echostep.plan import Level, Plan, parse_plan
 from echostep_app.cli import app
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.cropping import within
@@ -31,8 +30,7 @@ from echostep_app.plan.places.findings import PlanFinding, refusals
 from localization.test_drawn_places import ROOM as DRAWN
 from localization.test_drawn_places import drawing
 from snapshots import expect
-
-DEMO = Path(str(resources.files("echostep"))) / "plans/demo.json"
+from walks import DEMO, PLAN
 
 
 def flat(walls: Sequence[Any], **fields: Any) -> Plan:
@@ -90,7 +88,7 @@ def over(walls: list[list[float]], **upper: Any) -> Plan:
 
 
 SOUND = {
-    "the demo": load_plan(DEMO),
+    "the demo": PLAN,
     "a room": flat(box(), doors=[door()], rooms=[ROOM]),
     "nothing": flat([]),
     "storeys at one height": in_metres(0.0),
@@ -185,28 +183,27 @@ def test_walls_of_a_rectangle() -> None:
 
 @pytest.mark.slow
 def test_pictures(tmp_path: Path) -> None:
-    plan = load_plan(DEMO)
-    draw_plan(plan, tmp_path / "plan.png", [0])
+    draw_plan(PLAN, tmp_path / "plan.png", [0])
     seen = imread(tmp_path / "plan.png")[..., :3]
-    draw_plan(plan, tmp_path / "part.png", [0], (0, 0, 5, 5))
-    draw_plan(plan, tmp_path / "wrong.png", [0], None, [PlanFinding("gap", 0, (5.0, 5.0), "x", ((1, 1, 9, 9),), 1)])
+    draw_plan(PLAN, tmp_path / "part.png", [0], (0, 0, 5, 5))
+    draw_plan(PLAN, tmp_path / "wrong.png", [0], None, [PlanFinding("gap", 0, (5.0, 5.0), "x", ((1, 1, 9, 9),), 1)])
     wrong = imread(tmp_path / "wrong.png")[..., :3]
     assert (seen.min(axis=2) < 0.4).mean() > 0.002  # walls
     assert seen.shape == wrong.shape
     red = (wrong[..., 0] > 0.7) & (wrong[..., 1] < 0.2)
     assert red.sum() > 100
     assert ((seen[..., 0] > 0.7) & (seen[..., 1] < 0.2)).sum() == 0
-    draw_plan(plan, tmp_path / "plan.svg", [0])
+    draw_plan(PLAN, tmp_path / "plan.svg", [0])
     first = (tmp_path / "plan.svg").read_bytes()
-    draw_plan(plan, tmp_path / "plan.svg", [0])
+    draw_plan(PLAN, tmp_path / "plan.svg", [0])
     assert b"<svg" in first
     assert first == (tmp_path / "plan.svg").read_bytes()
     for label in ("x / m", "y / m", "wall", "start"):
         assert f"<!-- {label} -->".encode() in first
     with pytest.raises(EchostepError, match=r"\.svg or \.pdf"):
-        draw_plan(plan, tmp_path / "plan.gif", [0])
+        draw_plan(PLAN, tmp_path / "plan.gif", [0])
     with pytest.raises(EchostepError, match="cannot write"):
-        draw_plan(plan, tmp_path / "none" / "plan.png", [0])
+        draw_plan(PLAN, tmp_path / "none" / "plan.png", [0])
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from pyproj import Transformer
 from echostep.plan import Plan
 from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.report import ImportReport
+from plan.imported_plans import imported_file
 
 Schema = Literal["IFC2X3", "IFC4", "IFC4X3"]
 Triple = tuple[float, float, float]
@@ -178,8 +179,7 @@ def test_a_map_that_cannot_be_is_asked_about(tmp_path: Path, name: str) -> None:
 
 def imported(model: Model, folder: Path) -> tuple[Plan, ImportReport]:
     model.file.write(str(folder / "a.ifc"))
-    report = ImportReport()
-    return import_plan(folder / "a.ifc", report=report), report
+    return imported_file(folder / "a.ifc")
 
 
 def walled(length_m: float = 8.0) -> tuple[Model, Any]:

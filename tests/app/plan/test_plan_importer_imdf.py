@@ -15,8 +15,9 @@ from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import Hints, ImportReport
+from echostep_app.plan.importers.report import Hints
 from echostep_app.plan.importers.summary import summary
+from plan.imported_plans import imported_file
 
 LON, LAT = -2.978, 56.46
 EAST, NORTH = 1 / 61_650.0, 1 / 111_360.0  # degrees a metre there
@@ -194,10 +195,8 @@ def test_doors_that_are_drawn_stay_as_they_are(mall: Plan, tmp_path: Path) -> No
 
 def test_the_import_says_that_there_are_no_doors(tmp_path: Path) -> None:
     said = []
-    for hints in (Hints(), Hints(doors_m=0.9)):
-        report = ImportReport()
-        plan = import_plan(folder(tmp_path / "a", without_openings()), hints, report=report)
-        said.append("\n".join(summary(plan, report)))
+    for doors_m in (None, 0.9):
+        said.append("\n".join(summary(*imported_file(folder(tmp_path / "a", without_openings()), doors_m=doors_m))))
     assert "has no door openings, so its rooms cannot be entered: --doors 0.9" in said[0]
     assert "9 doors are assumed" in said[1]
     assert "no door openings" not in said[1]

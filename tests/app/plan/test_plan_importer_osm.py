@@ -14,9 +14,9 @@ from echostep.plan import Plan
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
 from echostep_app.plan.importers.osm.elements import levels_of
-from echostep_app.plan.importers.report import ImportReport
 from plan.habits import osm_house
 from plan.habits.house import Move
+from plan.imported_plans import imported_file
 
 LON, LAT = 8.85, 53.11
 EAST, NORTH = 1 / 66_945.0, 1 / 111_300.0  # degrees a metre there
@@ -125,9 +125,8 @@ def test_geojson_of_overpass_turbo(tmp_path: Path, name: str) -> None:
             ("MultiPolygon", [[RING[:-1]]], {"indoor": "room", "level": "1", "name": "Room 2"}),
         )
     )
-    report = ImportReport()
     assert is_foreign(tmp_path / name)
-    plan = import_plan(tmp_path / name, report=report)
+    plan, report = imported_file(tmp_path / name)
     assert [[room.name for room in level.rooms] for level in plan.levels] == [["Room 1"], ["Room 2"]]
     assert len(plan.levels[0].doors) == 1
     assert report.left_out == {"door on no wall": 1}
@@ -145,8 +144,7 @@ def test_an_outlines_door_is_on_the_ground(tmp_path: Path, kind: str, tags: dict
     rows = [node(k, x, y, **({"entrance": "main"} if k == 5 else {})) for k, (x, y) in enumerate(corners, 1)]
     tags = {"building": "yes"} | tags
     rows += [way(20, [1, 2, 3, 1], indoor="room", level="-1-2"), way(21, [4, 5, 6, 7, 8, 4], **tags)]
-    report = ImportReport()
-    plan = import_plan(osm_house.write(tmp_path, kind, rows, Move()), report=report)
+    plan, report = imported_file(osm_house.write(tmp_path, kind, rows, Move()))
     assert [one.name for one in plan.levels if one.doors] == [f"level {level}"] * (level is not None)
     assert ("on the ground (node" in report.doubts[0]) == (level is not None)
     rows.append(way(22, [1, 5, 2, 1], indoor="room", level="2"))

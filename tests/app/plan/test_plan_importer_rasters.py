@@ -12,10 +12,9 @@ from PIL import Image, ImageDraw
 import command_line
 from echostep.plan import load_plan
 from echostep_app.plan.importers.formats import import_plan, is_foreign
-from echostep_app.plan.importers.raster.picture import threshold
-from echostep_app.plan.importers.report import Hints, ImportReport
 from echostep_app.plan.importers.summary import size_m
 from echostep_app.plan.places.gaps import door_gaps
+from plan.imported_plans import imported_file
 
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 YAML = "image: map.{}\nresolution: 0.05\norigin: [-10.0, -20.0, {}]\nnegate: {}\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
@@ -34,8 +33,7 @@ def grid() -> np.ndarray:
 def test_a_room(tmp_path: Path) -> None:
     Image.fromarray(grid()).save(tmp_path / "map.pgm")
     (tmp_path / "map.yaml").write_text(YAML.format("pgm", 0, 0))
-    report = ImportReport()
-    plan = import_plan(tmp_path / "map.yaml", report=report)
+    plan, report = imported_file(tmp_path / "map.yaml")
     assert plan.levels[0].walls.reshape(-1, 2).min(axis=0) == pytest.approx((-10 + 20 * 0.05, -20 + 20 * 0.05))
     assert len(plan.levels[0].walls) == 12  # both faces, cut by the gap
     assert report.left_out == {"specks of less than 4 pixels": 1}
@@ -76,10 +74,9 @@ def scan(path: Path, ink: int = 40, paper: int = 225) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("kind", "ink", "paper"), [("png", 40, 225), ("jpg", 90, 150), ("bmp", 0, 255)])
+@pytest.mark.parametrize(("kind", "ink", "paper"), [("png", 40, 225), ("jpg", 90, 150), ("bmp", 30, 90)])
 def test_a_scan_becomes_walls(tmp_path: Path, kind: str, ink: int, paper: int) -> None:
-    report = ImportReport()
-    plan = import_plan(scan(tmp_path / f"a.{kind}", ink, paper), Hints(scale_m=PIXEL_M), report=report)
+    plan, report = imported_file(scan(tmp_path / f"a.{kind}", ink, paper), scale_m=PIXEL_M)
     (level,) = plan.levels
     assert size_m(level) == pytest.approx((10.0, 8.0), abs=0.1)
     assert 3 <= report.left_out["spots and letters up to 0.6 m"] < 10  # JPEG adds some
@@ -98,10 +95,3 @@ def test_the_command_takes_two_points(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert size_m(load_plan(out).levels[0]) == pytest.approx((10.0, 8.0), abs=0.1)
     assert load_plan(out).picture == (0.02, 0.0, 0.0)
-
-
-def test_the_threshold_lies_between_ink_and_paper() -> None:
-    for ink, paper in ((0, 255), (90, 150), (30, 60)):
-        values = np.full((50, 50), float(paper))
-        values[:10] = ink
-        assert ink <= threshold(values) < paper

@@ -27,6 +27,7 @@ from echostep_app.plan.pictures.drawing import draw_plan
 from echostep_app.plan.pictures.overlay import EDGE_M, Overlay, overlays, write_overlays
 from echostep_app.plan.pictures.symbols import HALF_JAMB_M, HALF_WINDOW_M, MOST_TREADS, level_lines, way_names
 from echostep_simulation.world.tower import tower
+from walks import PLAN
 
 WALLS = [[400, 300, 404, 300], [404, 300, 404, 303], [404, 303, 402, 303], [401, 303, 400, 303], [400, 303, 400, 300]]
 
@@ -159,9 +160,6 @@ def test_without_a_plan_there_are_no_lines() -> None:
     assert not any(len(lines) for lines in level_lines(NO_PLAN, 0).values())
 
 
-DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-
-
 def placed(plan: Plan, degrees: float) -> Plan:
     return replace(plan, georeference=Georeference(-2.978, 56.46, np.radians(degrees)))
 
@@ -186,10 +184,10 @@ def image(overlay: Overlay) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 @pytest.mark.parametrize("degrees", [30.0, -140.0])
 def test_walls_are_where_the_box_says(degrees: float) -> None:
     """Dark within two pixels of the middle of each outer wall; white in a room; clear outside of the building."""
-    plan = placed(DEMO, degrees)
+    plan = placed(PLAN, degrees)
     (overlay,) = overlays(plan)
     picture = image(overlay)
-    low, high = (f(DEMO.levels[0].solid.reshape(-1, 2), axis=0) for f in (np.min, np.max))
+    low, high = (f(PLAN.levels[0].solid.reshape(-1, 2), axis=0) for f in (np.min, np.max))
     for at in ((7.0, low[1]), (7.0, high[1]), (low[0], 7.0), (high[0], 7.0)):
         row, column = pixel(overlay, plan, (float(at[0]), float(at[1])))
         near = picture[row - 2 : row + 3, column - 2 : column + 3]
@@ -226,7 +224,7 @@ def test_the_archive_holds_a_document_and_a_picture_a_storey(tmp_path: Path) -> 
 
 def test_the_same_plan_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a.kmz", "b.kmz"):
-        write_overlays(placed(DEMO, 30.0), tmp_path / name)
+        write_overlays(placed(PLAN, 30.0), tmp_path / name)
     assert (tmp_path / "a.kmz").read_bytes() == (tmp_path / "b.kmz").read_bytes()
 
 

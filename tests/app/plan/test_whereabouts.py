@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ROOT
-from echostep.plan import Level, Plan, Room, load_plan
+from echostep.plan import Level, Plan, Room
 from echostep_app.plan.places.gaps import door_gaps
 from echostep_app.plan.places.standing import StandingGround
 from echostep_app.plan.places.whereabouts import Whereabouts
 from plan.imported_plans import seven_floors
-
-DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
+from walks import PLAN
 
 
 @pytest.mark.parametrize(
@@ -27,7 +25,7 @@ DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 )  # fmt: skip
 def test_rooms_of_the_demo_by_its_walls(at: tuple[float, float], words: str) -> None:
     """In the corridor the nearest name is Store's, 2.6 m away behind a wall."""
-    assert Whereabouts(DEMO).words(*at, 0) == words
+    assert Whereabouts(PLAN).words(*at, 0) == words
 
 
 @pytest.mark.parametrize(
@@ -54,10 +52,10 @@ FIELD = Plan("field", (Level("G", 0.0, np.zeros((0, 4))),), None, "")
 @pytest.mark.parametrize(
     ("plan", "at", "words"),
     [
-        (without_name(DEMO, *CORRIDORS), (9.5, 7.5), "in the corridor, by the door of Office 2"),
-        (without_name(DEMO, *CORRIDORS), (24.0, 5.0), "in the corridor"),
-        (without_name(DEMO, "Lab"), (15.7, 11.2), "near North corridor"),  # its door leads to two names
-        (without_name(DEMO, *(room.name for room in DEMO.levels[0].rooms)), (24.0, 5.0), "in the corridor"),
+        (without_name(PLAN, *CORRIDORS), (9.5, 7.5), "in the corridor, by the door of Office 2"),
+        (without_name(PLAN, *CORRIDORS), (24.0, 5.0), "in the corridor"),
+        (without_name(PLAN, "Lab"), (15.7, 11.2), "near North corridor"),  # its door leads to two names
+        (without_name(PLAN, *(room.name for room in PLAN.levels[0].rooms)), (24.0, 5.0), "in the corridor"),
         (FIELD, (1.0, 2.0), ""),
     ],
 )
@@ -66,8 +64,8 @@ def test_places_without_a_name_are_told_by_what_is_near(plan: Plan, at: tuple[fl
 
 
 def test_gaps_are_found_once_and_jambs_do_not_hide_them() -> None:
-    found = {tuple(np.round(sorted(gap.line[::2]) + sorted(gap.line[1::2]), 2)) for gap in door_gaps(DEMO.levels[0])}
-    assert len(found) == len(door_gaps(DEMO.levels[0])) == 7
+    found = {tuple(np.round(sorted(gap.line[::2]) + sorted(gap.line[1::2]), 2)) for gap in door_gaps(PLAN.levels[0])}
+    assert len(found) == len(door_gaps(PLAN.levels[0])) == 7
     assert (12.55, 13.45, 6.5, 6.5) in found
 
 
@@ -91,11 +89,11 @@ def test_a_wall_just_behind_the_widest_gap_is_not_reached() -> None:
 def test_no_start_outside_or_in_a_wall_of_the_demo(
     at: tuple[float, float], reason: str, nearest: tuple[float, float]
 ) -> None:
-    objection = StandingGround(DEMO).objection(*at, 0)
+    objection = StandingGround(PLAN).objection(*at, 0)
     assert objection is not None
     assert reason in objection.reason
     assert objection.nearest_m == pytest.approx(nearest)
-    assert StandingGround(DEMO).objection(*nearest, 0) is None
+    assert StandingGround(PLAN).objection(*nearest, 0) is None
 
 
 def test_no_start_in_a_thick_wall_or_a_table_of_seven_floors() -> None:

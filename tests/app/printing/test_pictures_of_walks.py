@@ -17,10 +17,9 @@ from matplotlib.colors import to_hex
 import echostep
 from echostep.errors import EchostepError
 from echostep.localization import LikelyPlace, TrackStatus
-from echostep.plan import load_plan
 from echostep_app.output.track_plot import WORDS, track_figure
 from echostep_app.printing.picture_files import ENDINGS
-from walks import DEMO, WALK, foot_track
+from walks import DEMO, PLAN, WALK, foot_track
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +70,7 @@ def test_another_kind_of_picture_is_refused(walk: echostep.Walk, tmp_path: Path)
 
 SHOWN: dict[str, Callable[[], Any]] = {
     "walk": lambda: echostep.replay(WALK, DEMO),
-    "plan": lambda: load_plan(DEMO),
+    "plan": lambda: PLAN,
     "foot": foot_track,
 }
 

@@ -17,7 +17,6 @@ import numpy as np
 from mcap.reader import make_reader
 
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.recording import MCAP_MAGIC, open_recording
 from echostep.recording.damage.scan import CHUNK, CHUNK_HEAD
@@ -26,7 +25,7 @@ from echostep_app.recording.recorder import Recorder
 from echostep_app.session.losses import skipped
 from echostep_app.session.options import TrackingOptions
 from echostep_app.session.runs.replay import tracker_of
-from walks import DEMO, walk_chunks
+from walks import DEMO, PLAN, walk_chunks
 
 BLOCK = 4096  # bytes, of most file systems
 BLOCKS = 16  # of a long stretch: a second and a half of a walk
@@ -68,7 +67,7 @@ def record_walk(path: Path, seconds: float) -> bytes:
 def replay(path: Path) -> Replayed:
     """Track a recording as `echostep replay` does."""
     recording = open_recording(path)
-    tracker = tracker_of(recording, load_plan(DEMO), TrackingOptions(DEMO))
+    tracker = tracker_of(recording, PLAN, TrackingOptions(DEMO))
     estimates = [estimate for portion in recording.portions() for estimate in tracker.take(portion)]
     return Replayed(estimates, skipped(recording, tracker.streams))
 

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from command_line import echostep
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.recording import Recording, open_recording
 from echostep.recording.damage.placing import Placement
@@ -28,7 +27,7 @@ from echostep_app.recording.repair.contents import info
 from echostep_app.recording.repair.edit import cut, repair
 from echostep_app.session.losses import skipped
 from recording.damages import arrival_offsets, flipped, message_records, read_by_index, write_recording
-from walks import DEMO, walk_chunks
+from walks import DEMO, PLAN, walk_chunks
 
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(1200)]
 CHUNKS_A_SECOND = 50
@@ -47,7 +46,7 @@ def read(path: Path) -> tuple[Recording, list[Chunk]]:
 
 
 def replay_says(recording: Recording) -> str:
-    return "\n".join(skipped(recording, Tracker(load_plan(DEMO)).streams))
+    return "\n".join(skipped(recording, Tracker(PLAN).streams))
 
 
 def made(folder: Path, kind: str) -> bytes:

@@ -13,7 +13,6 @@ import pytest
 
 from echostep.localization import Estimate
 from echostep.particles.limits import TRACKING_M
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.recording import open_recording
 from echostep.recording.mcap_records import HEAD_SIZE
@@ -33,7 +32,7 @@ from recording.damages import (
     write_recording,
 )
 from timing.test_disturbed_clocks import track
-from walks import DEMO, walk_chunks
+from walks import PLAN, walk_chunks
 
 SECONDS = 8.0
 CHUNKS = [Chunk("board" if n % 3 else "mtx", n * 20_000_000, bytes([n % 251]) * (n % 40 + 1)) for n in range(300)]
@@ -91,7 +90,7 @@ def test_a_wrong_length_costs_a_few_messages_not_all_behind_it(tmp_path: Path) -
         assert set(found) <= set(CHUNKS)
         assert len(found) >= len(CHUNKS) - 3
         assert (recording.own_damage.places, recording.own_damage.altered) == (1, True)
-        said = skipped(recording, Tracker(load_plan(DEMO)).streams)
+        said = skipped(recording, Tracker(PLAN).streams)
         assert any("checksum is wrong" in line for line in said)
         assert any("damaged bytes in one place were not used" in line for line in said)
 

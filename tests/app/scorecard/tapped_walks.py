@@ -14,11 +14,11 @@ from echostep.plan import Plan, Pose
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.check_in import PERSON, CheckIn
 from echostep.walk.recorded import SIMULATED
-from echostep_app.recording.recorder import Recorder
 from echostep_app.session.metadata import run_metadata
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Walk
 from echostep_simulation.scenario import START_NS, Scenario
+from recording.damages import write_recording
 
 STAND_S, NEAR_M = 2.0, 0.3  # at each place; within which the trunk stands there
 SD_M = 0.3  # of a tap on the page
@@ -64,9 +64,11 @@ def _stands(walk: Walk, xs_m: Sequence[float]) -> list[Stand]:
 
 def record(path: Path, plan: Plan, chunks: Sequence[Chunk], taps: Sequence[Chunk], start: Pose | None = None) -> Path:
     """A live run with these taps; without a start it waits for the first of them."""
-    with Recorder(path, run_metadata(plan, start, 3, "live", source=SIMULATED)) as recorder:
-        for chunk in sorted([*chunks, *taps], key=lambda chunk: chunk.t_arrival_ns):
-            recorder.write(chunk)
+    write_recording(
+        path,
+        sorted([*chunks, *taps], key=lambda chunk: chunk.t_arrival_ns),
+        run_metadata(plan, start, 3, "live", source=SIMULATED),
+    )
     return path
 
 

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from command_line import echostep
-
-PLAN = ROOT / "host/core/echostep/plans/demo.json"
+from walks import DEMO
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +41,7 @@ def score(folder: Path, *words: object) -> CompletedProcess[str]:
 
 
 def test_the_table_has_a_column_a_track_and_says_what_was_read(folder: Path) -> None:
-    done = score(folder, folder / "ours.csv", folder / "<b>[red]theirs.csv", "--plan", PLAN)
+    done = score(folder, folder / "ours.csv", folder / "<b>[red]theirs.csv", "--plan", DEMO)
     assert (done.returncode, done.stderr) == (0, "")
     assert "ours.csv: time is t_s, x is x_m, y is y_m, radius95 is radius95_m" in done.stdout
     assert "<b>[red]theirs.csv" in done.stdout

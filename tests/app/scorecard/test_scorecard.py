@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.errors import EchostepError
-from echostep.plan import load_plan
 from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep.walk.table import write_track
@@ -24,9 +22,7 @@ from echostep_app.scorecard.truth import card_of, load_truth
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import demo_scenario
 from echostep_simulation.world.tower import LENGTH_M, LIFT_AT, STOREY_M, tower
-from walks import walk_chunks
-
-DEMO = load_plan(ROOT / "host/core/echostep/plans/demo.json")
+from walks import PLAN, walk_chunks
 
 
 def written(path: Path, text: str) -> Path:
@@ -144,10 +140,10 @@ def test_a_plan_tells_floors_by_height_and_zones(tmp_path: Path) -> None:
 
 
 def test_zones_of_the_demo_plan_are_its_rooms() -> None:
-    zones = Zones(DEMO)
-    rooms = np.array([room.at_m for room in DEMO.levels[0].rooms])
+    zones = Zones(PLAN)
+    rooms = np.array([room.at_m for room in PLAN.levels[0].rooms])
     found = zones.of(rooms, np.zeros(len(rooms)))
-    names = [room.name for room in DEMO.levels[0].rooms]
+    names = [room.name for room in PLAN.levels[0].rooms]
     by_zone = {
         zone: [name for name, other in zip(names, found, strict=True) if other == zone] for zone in found.tolist()
     }
@@ -168,12 +164,12 @@ def test_a_lift_is_one_zone_on_each_floor() -> None:
 @pytest.mark.slow
 def test_the_same_figures_as_a_replay_prints(tmp_path: Path) -> None:
     """`echostep replay --truth` and `echostep score` agree to the last bit on our own track.csv."""
-    scenario = demo_scenario(DEMO, 3, PythonBoard(3))
+    scenario = demo_scenario(PLAN, 3, PythonBoard(3))
     scenario.write_truth(tmp_path / "truth.csv")
-    estimates = Tracker(DEMO, scenario.start, seed=3).take(portion_of(walk_chunks()))
+    estimates = Tracker(PLAN, scenario.start, seed=3).take(portion_of(walk_chunks()))
     write_track(tmp_path / "track.csv", estimates)
-    card = score(load_path(tmp_path / "track.csv", DEMO), load_path(tmp_path / "truth.csv", DEMO), DEMO)
-    printed = card_of(estimates, load_truth(tmp_path / "truth.csv", DEMO))
+    card = score(load_path(tmp_path / "track.csv", PLAN), load_path(tmp_path / "truth.csv", PLAN), PLAN)
+    printed = card_of(estimates, load_truth(tmp_path / "truth.csv", PLAN))
     assert printed is not None
     assert (printed.horizontal, printed.ellipse95_holds) == (card.horizontal, card.ellipse95_holds)
 

@@ -14,16 +14,15 @@ import pytest
 from typer.testing import CliRunner
 
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import Pose, load_plan
+from echostep.plan import Pose
 from echostep.ports.chunks import BOARD, FOOT, MTX, Chunk, portion_of
 from echostep_app.cli import app
-from echostep_app.recording.recorder import Recorder
 from echostep_app.session import losses
 from echostep_app.session.losses import Arrivals, Losses
 from echostep_app.session.metadata import run_metadata
 from page.frames import told
-from walks import DEMO as PLAN
-from walks import walk_chunks
+from recording.damages import write_recording
+from walks import DEMO, PLAN, walk_chunks
 
 
 class Run:
@@ -71,16 +70,13 @@ def test_each_reason_with_its_time() -> None:
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path, plan = tmp_path_factory.mktemp("walk") / "walk.mcap", load_plan(PLAN)
-    with Recorder(path, run_metadata(plan, Pose(2.0, 7.5, 0.0), 1, "test")) as recorder:
-        for chunk in walk_chunks():
-            recorder.write(chunk)
-            recorder.wait_for_disk(chunk)
+    path = tmp_path_factory.mktemp("walk") / "walk.mcap"
+    write_recording(path, walk_chunks(), run_metadata(PLAN, Pose(2.0, 7.5, 0.0), 1, "test"))
     return path
 
 
 def replayed(recording: Path, out: Path, *more: str) -> tuple[int, str]:
-    command = ["replay", str(recording), "--plan", str(PLAN), "--headless", "--out", str(out), *more]
+    command = ["replay", str(recording), "--plan", str(DEMO), "--headless", "--out", str(out), *more]
     done = CliRunner().invoke(app, command)
     return done.exit_code, done.output + str(done.exception or "")
 

@@ -16,7 +16,6 @@ from board_runs import ROOT
 from command_line import echostep
 from echostep.errors import EchostepError
 from echostep.localization import Estimate
-from echostep.plan import load_plan
 from echostep.ports.chunks import Portion, portion_of
 from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
@@ -26,12 +25,12 @@ from echostep_app.session.runs import demo
 from echostep_app.session.session import Session
 from echostep_app.session.sinks import Sink, derived_sink
 from echostep_simulation.scenario import DEMO_WAYPOINTS
-from page.browser import PLAN, demo_walk
-from page.frames import told
+from page.browser import demo_walk
+from page.frames import PLAN, told
 from waiting import PATIENCE_S
 
 # What the results ask of a tracker
-TRACKER: Any = SimpleNamespace(plan=load_plan(ROOT / "host/core/echostep/plans/demo.json"), beacon_places=lambda _: [])
+TRACKER: Any = SimpleNamespace(plan=PLAN, beacon_places=lambda _: [])
 
 
 def test_track_and_summary_come_before_the_picture(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import BOARD, Chunk
 from echostep.ports.people.meeting import MEETING, parse_meeting
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons, parse_team_beacons
@@ -21,8 +20,9 @@ from echostep_app.team.inbox import MESSAGES_PER_TOPIC
 from echostep_app.team.mqtt.publisher import Listener
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import POSITION, report
 from waiting import until
+from walks import PLAN
 
 ANNA, EVE, MARK = "echostep/red/anna/estimate", "echostep/blue/eve/estimate", "echostep-table/mark/0123abcd"
 
@@ -74,7 +74,7 @@ def test_teammates_on_this_plan_can_be_met(tmp_path: Path, monkeypatch: pytest.M
     """The wearer's own reports, those on another plan and those of another team are not among them."""
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     with Broker(tmp_path) as broker:
-        feed, subscription = a_feed(broker, load_plan(PLAN), "bo", RUN)
+        feed, subscription = a_feed(broker, "bo", RUN)
         said: list[tuple[str, ...]] = []
 
         def hears(*names: str) -> bool:
@@ -111,14 +111,11 @@ def test_beacons_reach_teammates_once_and_hostile_ones_are_counted(
     """Those of this run, of another plan and of another team are not heard; those of an earlier run under the same name are."""
     monkeypatch.setattr("echostep_app.session.team.subscription.LOOK_S", 0.0)
     monkeypatch.setattr(teammate_feed, "SHARE_S", 0.0)
-    plan = load_plan(PLAN)
-    early = TeamBeacons(1, "bo", "0000aaaa", plan.digest, (a_beacon(3),))
+    early = TeamBeacons(1, "bo", "0000aaaa", PLAN.digest, (a_beacon(3),))
     heard: list[TeamBeacons] = []
     with Broker(tmp_path) as broker:
         publish(broker.url, "echostep/red/bo/beacons", early.encode())
-        (bo, of_bo), (zoe, of_zoe) = (
-            a_feed(broker, plan, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN))
-        )
+        (bo, of_bo), (zoe, of_zoe) = (a_feed(broker, name, run) for name, run in (("bo", "0000bbbb"), ("zoe", RUN)))
 
         def hears(count: int) -> bool:
             bo.news()
@@ -153,9 +150,9 @@ def publish(url: str, topic: str, payload: bytes) -> None:
     sender.close()
 
 
-def a_feed(broker: Broker, plan: Plan, name: str, run: str) -> tuple[TeammateFeed, TeamSubscription]:
+def a_feed(broker: Broker, name: str, run: str) -> tuple[TeammateFeed, TeamSubscription]:
     outlet = parse_outlet([broker.url], name, "red")
     subscription = TeamSubscription(outlet.endpoints[0], print)
-    feed = TeammateFeed(subscription, outlet, run, plan)
+    feed = TeammateFeed(subscription, outlet, run, PLAN)
     subscription.open()
     return feed, subscription

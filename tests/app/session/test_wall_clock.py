@@ -11,14 +11,14 @@ import pytest
 
 import echostep
 import echostep_app
-from echostep.plan import load_plan
 from echostep_app.operation import requests
 from echostep_app.operation.operation import Operation
 from echostep_app.team.messages.marks import MarkBoard
 from echostep_app.team.messages.report import ReportedAlarm, encode
 from echostep_app.team.outbox import stamped
 from echostep_app.team.roster import MemberState, Roster
-from team.team_reports import PLAN, POSITION, report
+from team.team_reports import POSITION, report
+from walks import PLAN
 
 READS = re.compile(r"\btime\.time(_ns)?\(|\bdatetime\.now\(|\btime\.(localtime|gmtime)\(")
 HOUR_S = 3600.0
@@ -62,9 +62,9 @@ def test_a_trackers_clock_that_steps_changes_no_state_and_is_noted(step_s: float
 @pytest.mark.parametrize("step_s", [-HOUR_S, HOUR_S])
 def test_a_commander_whose_clock_steps_can_send_again(step_s: float) -> None:
     """A newer errand replaces an older one, whatever this commander's clock says."""
-    operation, now_s, unix_s = Operation(load_plan(PLAN)), time.monotonic(), time.time()
-    rescued = report("anna", alarm=ReportedAlarm("mayday", "fall", 1, 31.0), plan_sha256=load_plan(PLAN).digest)
-    for made in (rescued, report("bo", plan_sha256=load_plan(PLAN).digest)):
+    operation, now_s, unix_s = Operation(PLAN), time.monotonic(), time.time()
+    rescued = report("anna", alarm=ReportedAlarm("mayday", "fall", 1, 31.0))
+    for made in (rescued, report("bo")):
         assert operation.roster.receive(f"echostep/red/{made.name}/estimate", encode(made), False, now_s, unix_s)
     operation.receive([], {}, now_s, unix_s)
     numbers = {row.name: row.id for row in operation.scene(now_s, unix_s).rows}

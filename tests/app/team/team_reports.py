@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from board_runs import ROOT
 from echostep.localization import Estimate
-from echostep.plan import Plan, load_plan
+from echostep.plan import Plan
 from echostep.tracker import Tracker
 from echostep_app.printing.lines import moment
 from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages.report import Motion, Position, Report, ReportedPlace, StreamReport, encode
 from echostep_app.team.publish import Publishing
 from echostep_app.team.roster import Roster
+from walks import PLAN
 
-PLAN = Path(ROOT / "host/core/echostep/plans/demo.json")
 POSITION = Position(12.5, 0.0, 3.0, 2.0, 0.04, 0.01, 0.09, 0.75, 0.5, 0.1, 0, "Ground floor", 0.98, 0.0, 0.1)
 PLACE = ReportedPlace(48.2, 16.37, None, 0.31, None, 61.4)
 
@@ -31,7 +29,7 @@ def report(name: str = "anna", sequence: int = 1, at_s: float | None = None, **f
     sent_s = time.time() if at_s is None else at_s
     made = Report(
         1, "red", name, "0123abcd", sequence, moment(sent_s), moment(sent_s + 10.0), "live", "tracking", POSITION,
-        Motion(7, 9.5, 1.2, 0.4), PLACE, StreamReport(100.0, 360.0, 0, 0, 0, True, ()), "Demo office", load_plan(PLAN).digest, "0.1.0", None, 0,
+        Motion(7, 9.5, 1.2, 0.4), PLACE, StreamReport(100.0, 360.0, 0, 0, 0, True, ()), "Demo office", PLAN.digest, "0.1.0", None, 0,
     )  # fmt: skip
     return replace(made, **fields)
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import paho.mqtt.client as paho
 import pytest
 
-from echostep.plan import load_plan
 from echostep.tracker import Tracker
 from echostep_app.team import inbox
 from echostep_app.team.endpoint import Endpoint, Outlet, parse_endpoint
@@ -27,8 +26,9 @@ from echostep_app.team.outbox import Delivery, Outbox
 from echostep_app.team.publish import Publishing
 from team.network import box_to
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN, report
+from team.team_reports import report
 from waiting import PATIENCE_S, until
+from walks import PLAN
 
 MAYDAY = ReportedAlarm("mayday", "help", 1, 3.0)
 needs_passwords = pytest.mark.skipif(
@@ -74,7 +74,7 @@ def test_what_the_rules_allow_is_acknowledged_and_other_topics_are_refused(guard
         url = f"mqtt://wearer1:x@127.0.0.1:{broker.port}"
         outlet = Outlet((parse_endpoint(url),), "anna", "green")
         lines: list[str] = []
-        with Publishing(outlet, Tracker(load_plan(PLAN)), "live", lines.append) as publishing:
+        with Publishing(outlet, Tracker(PLAN), "live", lines.append) as publishing:
             assert publishing.receipt(1) == "It is being sent."
             publishing._offer(replace(report(), team="green", alarm=MAYDAY))
             assert until(lambda: "broker has it" in publishing.receipt(1))
@@ -147,7 +147,7 @@ def test_a_mayday_that_cannot_go_out_is_told_first_and_holds_up_no_end(monkeypat
     monkeypatch.setattr("echostep_app.team.outbox.RETRY_PAUSES_S", (10.0 * PATIENCE_S,))
     lines: list[str] = []
     outlet = Outlet((parse_endpoint("mqtt://127.0.0.1:1"),), "anna", "green")
-    with Publishing(outlet, Tracker(load_plan(PLAN)), "live", lines.append) as publishing:
+    with Publishing(outlet, Tracker(PLAN), "live", lines.append) as publishing:
         assert until(lambda: publishing.fault)
         publishing._offer(report(alarm=MAYDAY))
         assert any(line.startswith("MAYDAY has not gone out: mqtt: connection refused") for line in lines)

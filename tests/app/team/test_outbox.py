@@ -13,15 +13,16 @@ from hypothesis import strategies as st
 
 from echostep.errors import EchostepError
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import Georeference, load_plan
+from echostep.plan import Georeference
 from echostep_app.team import outbox
 from echostep_app.team.cot import event, uid
 from echostep_app.team.endpoint import parse_endpoint
 from echostep_app.team.messages.report import BadReportError, Report, check_name, decode, encode
 from echostep_app.team.outbox import Delivery, Outbox, stamped
 from echostep_app.team.publish import GroundPlane, ReportHistory
-from team.team_reports import PLACE, PLAN, POSITION, UNIX, report
+from team.team_reports import PLACE, POSITION, UNIX, report
 from waiting import PATIENCE_S, until
+from walks import PLAN
 
 
 class Recorded:
@@ -90,7 +91,7 @@ def test_motion_knows_steps_way_pace_and_rest() -> None:
 
 
 def test_a_place_on_earth() -> None:
-    turned = replace(load_plan(PLAN), georeference=Georeference(16.0, 48.0, 0.5 * math.pi), uncertainty_m=0.4)
+    turned = replace(PLAN, georeference=Georeference(16.0, 48.0, 0.5 * math.pi), uncertainty_m=0.4)
     there = GroundPlane(turned).place(100.0, 0.0, 0.3, 0.0)  # the plan's x points north
     assert there.lat_deg == pytest.approx(48.0 + 100.0 / 111_200.0, abs=1e-6)
     assert there.lon_deg == pytest.approx(16.0, abs=1e-9)

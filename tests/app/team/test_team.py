@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echostep.plan import load_plan
 from echostep_app.team.commander import as_tree, notes
 from echostep_app.team.inbox import MESSAGES_PER_TOPIC, Inbox
 from echostep_app.team.messages.report import (
@@ -26,7 +25,8 @@ from echostep_app.team.messages.report import (
     schema,
 )
 from echostep_app.team.roster import CONTRADICTION, MAX_MEMBERS, MAX_REASONS, MemberState, Roster
-from team.team_reports import NOW, PLAN, POSITION, UNIX, heard, report, said
+from team.team_reports import NOW, POSITION, UNIX, heard, report, said
+from walks import PLAN
 
 
 def test_a_report_reads_back_as_it_was_and_obeys_its_schema() -> None:
@@ -96,7 +96,7 @@ def test_a_report_with_one_field_replaced_is_believed_only_as_the_schema_says(dr
     roster = Roster()
     roster.receive("echostep/red/anna/estimate", payload, False, NOW, UNIX)
     assert len(roster.members(NOW)) + sum(roster.rejected.values()) == 1
-    json.dumps(as_tree(roster, load_plan(PLAN), NOW), allow_nan=False)
+    json.dumps(as_tree(roster, PLAN, NOW), allow_nan=False)
     if roster.members(NOW):
         jsonschema.validate(json.loads(payload), json.loads(schema()))
 
@@ -166,7 +166,7 @@ def test_what_is_of_another_day_is_not_shown() -> None:
 def test_two_trackers_of_one_name_are_both_shown_and_named() -> None:
     roster = heard(said(), said(run="ffffffff", sequence=5))
     assert roster.duplicates(NOW) == {("red", "anna")}
-    notes = [m["notes"] for m in as_tree(roster, load_plan(PLAN), NOW)["members"]]
+    notes = [m["notes"] for m in as_tree(roster, PLAN, NOW)["members"]]
     assert len(notes) == 2
     assert all("name used twice" in n[0] for n in notes)
 
@@ -199,7 +199,7 @@ def test_two_senders_under_one_name_and_run_are_named() -> None:
         roster.receive("echostep/red/anna/estimate", encode(made), False, NOW + k, UNIX + k)
     (member,) = roster.members(NOW + 4.0)
     assert roster.rejected["a second sender under one name and run"] == 3
-    assert f"{CONTRADICTION} 3 x" in notes(member, load_plan(PLAN), NOW + 4.0, set())
+    assert f"{CONTRADICTION} 3 x" in notes(member, PLAN, NOW + 4.0, set())
     assert member.missed == 898
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import random
 import socket
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +23,7 @@ from echostep_app.team.inbox import Inbox, ListenerThread
 from echostep_app.team.messages.report import encode
 from echostep_app.team.mqtt.publisher import Listener, MqttTransport
 from echostep_app.team.roster import Member, MemberState, Roster
+from players import playing
 from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker
 from team.team_reports import report
@@ -199,31 +199,22 @@ def test_a_commander_survives_garbage_and_floods(tmp_path: Path) -> None:
 def test_a_broker_that_speaks_nonsense_stops_nobody(nonsense: bytes) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(0.2)
-        served = threading.Event()
 
         def serve() -> None:
-            while not served.is_set():
-                try:
-                    caller, _ = server.accept()
-                except TimeoutError:
-                    continue
-                with caller, suppress(OSError):  # the other end may be gone already
-                    caller.settimeout(PATIENCE_S)
-                    caller.recv(1000)
-                    caller.sendall(nonsense)
-                    time.sleep(0.05)
+            with suppress(OSError), server.accept()[0] as caller:  # the other end may be gone already
+                caller.settimeout(PATIENCE_S)
+                caller.recv(1000)
+                caller.sendall(nonsense)
+                time.sleep(0.05)
 
-        thread = threading.Thread(target=serve)
-        thread.start()
         url = f"mqtt://127.0.0.1:{server.getsockname()[1]}"
         words: list[str] = []
-        box, feed = box_to(url, words), Ear(url)
-        try:
-            box.offer(at(1.0))
-            assert until(lambda: words and feed.words)
-        finally:
-            feed.reception.close()
-            box.close()
-            served.set()
-            thread.join()
+        with playing(serve):
+            box, feed = box_to(url, words), Ear(url)
+            try:
+                box.offer(at(1.0))
+                assert until(lambda: words and feed.words)
+            finally:
+                feed.reception.close()
+                box.close()
     assert "trying again" in words[0]

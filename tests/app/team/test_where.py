@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from echostep.localization import Estimate, LikelyPlace, TrackStatus
-from echostep.plan import NO_PLAN, Plan, load_plan
+from echostep.plan import NO_PLAN
 from echostep.tracker import Tracker
 from echostep.walk.table import columns_of
 from echostep_app.operation.operation import Operation
@@ -31,11 +31,12 @@ from echostep_app.team.messages.report import BadReportError, Report, ReportedAl
 from echostep_app.team.outbox import stamped
 from echostep_app.team.roster import Roster
 from page.frames import told
-from team.team_reports import PLAN, POSITION, offered, report
+from team.team_reports import POSITION, UNIX, offered, report
+from walks import PLAN
 
 
 def test_a_published_estimate_names_the_room() -> None:
-    reports = offered(load_plan(PLAN), told(6.0, 9.0), told(6.3, 7.5))
+    reports = offered(PLAN, told(6.0, 9.0), told(6.3, 7.5))
     assert [made.position.where for made in reports if made.position] == ["in Office 1", "in North corridor"]
 
 
@@ -45,7 +46,7 @@ def test_the_commander_and_tak_see_it() -> None:
     roster = Roster()
     roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
     (member,) = roster.members(0.0)
-    assert ", in Office 1, " in shown_wearer(1, member, load_plan(PLAN), 0.0, set(), MarkBoard()).words
+    assert ", in Office 1, " in shown_wearer(1, member, PLAN, 0.0, set(), MarkBoard()).words
 
 
 def test_an_older_report_has_no_place_in_words_and_a_hostile_one_is_refused() -> None:
@@ -62,22 +63,21 @@ def test_a_wearer_without_a_plan_is_believed_and_meets_nobody_on_a_plan() -> Non
     """Its frame is its own: it is listed, and on no plan."""
     (own,) = offered(NO_PLAN, told(6.0, 9.0))
     made = replace(report(), position=own.position, plan=own.plan, plan_sha256=own.plan_sha256)
-    roster, plan = Roster(), load_plan(PLAN)
+    roster = Roster()
     assert roster.receive("echostep/red/anna/estimate", encode(made), False, 0.0, made.sent_s)
     (member,) = roster.members(0.0)
-    assert "tracked without a plan" in notes(member, plan, 0.0, set())
-    assert level_on(plan, member) is None
-    assert made.plan_sha256 not in (plan.digest, NO_PLAN.digest)
+    assert "tracked without a plan" in notes(member, PLAN, 0.0, set())
+    assert level_on(PLAN, member) is None
+    assert made.plan_sha256 not in (PLAN.digest, NO_PLAN.digest)
 
 
 def test_the_name_of_a_plan_is_no_markup() -> None:
     console = Console(width=80)
     with console.capture() as shown:
-        console.print(listed(Operation(load_plan(PLAN)).scene(0.0, 0.0), "[/wrong]"))
+        console.print(listed(Operation(PLAN).scene(0.0, 0.0), "[/wrong]"))
     assert "[/wrong]: 0 wearers" in shown.get()
 
 
-UNIX = 1_800_000_000.0
 OFFICE, CORRIDOR = (6.0, 9.0), (6.3, 7.5)  # of the demo's building
 PLACES = tuple(LikelyPlace(0.5, x, y, 0, 0.1, 0.0) for x, y in (OFFICE, CORRIDOR))
 
@@ -87,14 +87,9 @@ def lost(t_s: float) -> Estimate:
 
 
 @pytest.fixture
-def plan() -> Plan:
-    return load_plan(PLAN)
-
-
-@pytest.fixture
-def published(plan: Plan) -> list[Report]:
+def published() -> list[Report]:
     """Lost from the start; then known in an office; then lost for 40 s."""
-    reports = offered(plan, lost(10.0), replace(told(*OFFICE), t_s=20.0), lost(60.0))
+    reports = offered(PLAN, lost(10.0), replace(told(*OFFICE), t_s=20.0), lost(60.0))
     return [decode(encode(stamped(made, k, UNIX, 0.0, 0))) for k, made in enumerate(reports)]
 
 
@@ -110,12 +105,12 @@ def test_its_report_has_no_position_and_the_last_known_one_with_its_age(publishe
     assert last.last_place.radius95_m > 60.0  # 40 s at 1.5 m/s
 
 
-def test_the_commander_reads_where_it_was_and_how_long_ago(published: list[Report], plan: Plan) -> None:
+def test_the_commander_reads_where_it_was_and_how_long_ago(published: list[Report]) -> None:
     roster = Roster()
     for k, made in enumerate(published):
         assert roster.receive("echostep/red/anna/estimate", encode(made), False, float(k), UNIX)
     (member,) = roster.members(2.0)
-    words = shown_wearer(1, member, plan, 2.0, set(), MarkBoard()).words
+    words = shown_wearer(1, member, PLAN, 2.0, set(), MarkBoard()).words
     assert words == "lost, last known 40 s ago, Ground floor, in Office 1, heard now"
 
 
@@ -129,21 +124,21 @@ def test_tak_has_no_point_of_it(published: list[Report]) -> None:
     assert "place not known; last known 40 s ago, in Office 1, Ground floor" in (event.findtext("detail/remarks") or "")
 
 
-def test_the_terminal_and_the_page_name_no_place(plan: Plan) -> None:
-    assert describe(lost(10.0), plan).startswith("lost: place not known, 2 places fit, 100 % in all")
-    taps = Taps(plan)
+def test_the_terminal_and_the_page_name_no_place() -> None:
+    assert describe(lost(10.0), PLAN).startswith("lost: place not known, 2 places fit, 100 % in all")
+    taps = Taps(PLAN)
     assert (taps.where(lost(10.0)), taps.where(told(*OFFICE))) == ("", "in Office 1")
     assert taps.places(lost(10.0)) == "places that fit: 1 in Office 1 50 % · 2 in North corridor 50 %"
 
 
-def test_the_last_line_of_a_run_says_so(plan: Plan, tmp_path: Path) -> None:
+def test_the_last_line_of_a_run_says_so(tmp_path: Path) -> None:
     with console.capture() as printed:
-        write_results(tmp_path, Tracker(plan), None, Result("a walk", [told(*OFFICE), lost(10.0)]))
+        write_results(tmp_path, Tracker(PLAN), None, Result("a walk", [told(*OFFICE), lost(10.0)]))
     assert "end: place not known" in printed.get()
     assert "corridor" not in printed.get()
 
 
-def test_files_for_maps_have_no_point_of_it(plan: Plan) -> None:
-    track = TrackOnPlan([told(*OFFICE), lost(10.0), replace(told(*CORRIDOR), t_s=11.0)], plan, [])
+def test_files_for_maps_have_no_point_of_it() -> None:
+    track = TrackOnPlan([told(*OFFICE), lost(10.0), replace(told(*CORRIDOR), t_s=11.0)], PLAN, [])
     assert track.stretches == [[0], [2]]
-    assert columns_of(track.estimates, plan)["status"][1] == "lost"
+    assert columns_of(track.estimates, PLAN)["status"][1] == "lost"

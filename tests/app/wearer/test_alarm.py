@@ -8,9 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.odometry import Alarm, AlarmKind, AlarmReason
-from echostep.plan import Pose, load_plan
+from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.check_in import PERSON, Call, CheckIn
 from echostep.tracker import Tracker
@@ -22,9 +21,9 @@ from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
 from echostep_studies.simulation.body_motion import MTX
 from echostep_studies.simulation.falling import sideways, walk_then
+from walks import PLAN
 from wearer.fall_bytes import fall_chunks
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 END_STILL_S = 60.0
 
 

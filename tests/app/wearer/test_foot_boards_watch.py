@@ -10,7 +10,8 @@ from echostep.ports.chunks import portion_of
 from echostep.tracker import Tracker
 from echostep_app.board.faults.health import all_findings
 from echostep_app.wearer.alarm import watch_of
-from odometry.foot_board_walk import PLAN, walk
+from odometry.foot_board_walk import walk
+from walks import PLAN
 
 pytestmark = needs_twin
 

@@ -6,31 +6,25 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable
 from functools import cache
-from importlib.resources import files
 from operator import attrgetter
-from pathlib import Path
 
 import numpy as np
 
 from echostep.arrays import Floats
-from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import Chunk
 from echostep.tracker import Tracker
 from echostep_simulation.devices.beacon_gateway import BeaconWorld, gateway_chunks, lay_beacons
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import START_NS, Scenario
+from walks import PLAN
 
 SEED = 5
-
-
-def demo() -> Plan:
-    return load_plan(Path(str(files("echostep") / "plans" / "demo.json")))
 
 
 def heard(truth: Floats, places: Floats) -> list[Chunk]:
     """What a gateway hears, on a true path (n, 3 or more) in the demo office, of beacons at these places (k, 3)."""
     arrival_ns = START_NS + np.rint(1e9 * truth[:, 0]).astype(np.int64)
-    world = BeaconWorld(places, demo().levels[0].walls)
+    world = BeaconWorld(places, PLAN.levels[0].walls)
     return list(gateway_chunks(world, truth[:, 0], truth[:, 1:3], arrival_ns, SEED))
 
 
@@ -41,7 +35,7 @@ def merged(*streams: Iterable[Chunk]) -> list[Chunk]:
 
 class Walk:
     def __init__(self) -> None:
-        self.plan = demo()
+        self.plan = PLAN
         scenario = Scenario(self.plan, ((2.0, 7.5), (22.0, 7.5)), SEED, PythonBoard(seed=SEED))
         self.start, self.truth = scenario.start, scenario.truth
         self.alone = list(scenario.chunks())

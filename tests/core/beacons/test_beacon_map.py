@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from beacons.beacon_walk import SEED, Walk, beacon_walk, demo, heard, merged
+from beacons.beacon_walk import SEED, Walk, beacon_walk, heard, merged
 from echostep.elementary import mean_angle
 from echostep.localization import Start, digest
 from echostep.localization.belief import CloudHypothesis
@@ -19,6 +19,7 @@ from echostep.tracker import Tracker
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Waypoint
 from echostep_simulation.scenario import Scenario
+from walks import PLAN
 
 
 @pytest.fixture(scope="module")
@@ -72,13 +73,12 @@ def test_another_cloud_that_is_tracked_from_now_on_locates_the_beacons_anew(walk
 
 def states_at_the_end(path: tuple[Waypoint, ...], dies_s: float) -> dict[int, str]:
     """The states of the beacons about a walk in the corridor, of which number 2 dies."""
-    plan = demo()
-    scenario = Scenario(plan, path, SEED, PythonBoard(seed=SEED))
+    scenario = Scenario(PLAN, path, SEED, PythonBoard(seed=SEED))
     truth = scenario.truth
     places = np.array([(3.0, 7.4, 0.0), (8.5, 7.6, 1.0), (9.5, 10.8, 2.0)])
     after = np.where(np.arange(3)[:, None] == 1, 500.0, places)
     early = truth[:, 0] < min(dies_s, truth[-2, 0])
-    tracker = Tracker(plan, scenario.start, seed=SEED)
+    tracker = Tracker(PLAN, scenario.start, seed=SEED)
     tracker.take(portion_of(merged(scenario.chunks(), heard(truth[early], places), heard(truth[~early], after))))
     assert tracker.filter
     found = tracker.filter.beacon_map.places(tracker.filter.cloud, truth[-1, 0])

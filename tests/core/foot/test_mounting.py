@@ -11,20 +11,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.foot import soft_limit, stance
 from echostep.foot.alignment import Alignment, aligned
 from echostep.foot.steps import Foot, Step, Track, walk_track
 from echostep.jit import lean_kernel
-from echostep.plan import Plan, load_plan
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep.xsens import MTDATA, MtxReader, encode_frame, pack_mtdata
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
 from foot import foot_walks as fw
-from walks import errors_of
+from walks import PLAN, errors_of
 
 
 def axis_mountings() -> list[Floats]:
@@ -88,18 +86,17 @@ def test_live_the_first_steps_wait_for_the_toe_and_no_others() -> None:
 
 
 @pytest.fixture(scope="module")
-def live() -> tuple[Plan, Scenario, list[Chunk]]:
+def live() -> tuple[Scenario, list[Chunk]]:
     """A simulated walk, x of the MTx to the toe."""
-    plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-    scenario = Scenario(plan, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5)), 5, PythonBoard(5))
-    return plan, scenario, list(scenario.chunks())
+    scenario = Scenario(PLAN, ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5)), 5, PythonBoard(5))
+    return scenario, list(scenario.chunks())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", [0, 5, 11, 18, 22])
-def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]], which: int) -> None:
+def test_live_the_mtx_may_sit_in_any_way(live: tuple[Scenario, list[Chunk]], which: int) -> None:
     """The same bytes with the sensor's axes turned: as good a track."""
-    plan, scenario, chunks = live
+    scenario, chunks = live
     mounting = axis_mountings()[which]
     frames, turned = MtxReader(), []
     for chunk in chunks:
@@ -110,7 +107,7 @@ def test_live_the_mtx_may_sit_in_any_way(live: tuple[Plan, Scenario, list[Chunk]
             ]
             chunk = replace(chunk, data=b"".join(encode_frame(MTDATA, pack_mtdata(s)) for s in samples))
         turned.append(chunk)
-    found = Tracker(plan, scenario.start, seed=0).take(portion_of(turned))
+    found = Tracker(PLAN, scenario.start, seed=0).take(portion_of(turned))
     off = errors_of(found, scenario)
     assert off.horizontal_m.mean() < 0.2
     assert off.horizontal_m.max() < 0.8

@@ -11,12 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.localization import Estimate, TrackStatus
 from echostep.localization.unmeasured import LONG_S, PAUSE_S, UNOBSERVED_DOUBT, UnmeasuredWay
 from echostep.path import UNOBSERVED_SD_M, MeasuredSegment, PathSegment
-from echostep.plan import load_plan
 from echostep.tracker import Tracker
+from walks import PLAN
 
 
 def segment(t0_s: float, t1_s: float, length_m: float = 0.7, sd_m: float = 0.02, pings: int = 5) -> MeasuredSegment:
@@ -54,7 +53,7 @@ def test_a_long_unobserved_segment_is_a_gap(share: float) -> None:
     ("t_s", "status"), [(27.1, TrackStatus.LOST), (33.1, TrackStatus.TRACKING), (34.0, TrackStatus.TRACKING)]
 )
 def test_an_estimate_that_a_dropout_has_overtaken_claims_nothing(t_s: float, status: TrackStatus) -> None:
-    tracker = Tracker(load_plan(ROOT / "host/core/echostep/plans/demo.json"))
+    tracker = Tracker(PLAN)
     tracking = Estimate(t_s, 12.0, 7.5, 0.01, 0.0, 0.01, 0.0, 0.02, 1, TrackStatus.TRACKING)
     tracker._publish(None, replace(tracking, x_m=2.0, t_s=33.4, status=TrackStatus.LOST))
     late = tracker._publish(None, tracking)

@@ -5,34 +5,21 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
-from echostep.localization import Building, FilterSettings, MapFilter, Start
-from echostep.path import MeasuredSegment, PathSegment
+from echostep.localization import Start
 from echostep.plan import Pose
-from echostep.walls.level_sheet import lay_out_levels
-from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M
+from localization.test_last_place import filter_of, standing
 
 PAUSE_S = 20.0  # a ride over two storeys
 FIRST_M = 100.0  # height by pressure on the lowest floor
-SETTINGS = FilterSettings()
-
-
-def standing(t0_s: float, height_m: float, barometer_starts: int = 0) -> MeasuredSegment:
-    """Half a second in the lift, with five heights by pressure."""
-    path = PathSegment(t0_s, t0_s + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
-    heights_m = np.full(5, height_m)
-    return MeasuredSegment(
-        path, np.zeros(0), np.zeros(0, np.int64), np.zeros(0), heights_m, barometer_starts=barometer_starts
-    )
+IN_LIFT = Start(Pose(*LIFT_AT, 0.0, 0), 0.05)
 
 
 def levels_after_ride(height_m: float, barometer_starts: int) -> tuple[float, ...]:
     """Probability of each level after 3 s in the lift on the lowest floor, a pause, and 3 s at a height by pressure."""
-    laid_out = lay_out_levels(tower(3))
-    building = Building(laid_out.walls, laid_out.sheet)
-    tracked = MapFilter(building, Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), SETTINGS)
+    tracked = filter_of(IN_LIFT)
     for k in range(6):
         tracked.update(standing(0.5 * k, FIRST_M))
     begin_s = 3.0 + PAUSE_S
@@ -54,11 +41,7 @@ def test_heights_of_another_board_tell_no_ride() -> None:
 
 
 def test_weather_makes_a_long_pause_worthless() -> None:
-    laid_out = lay_out_levels(tower(3))
-    cloud = MapFilter(
-        Building(laid_out.walls, laid_out.sheet), Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0,
-        np.random.default_rng(1), SETTINGS,
-    ).cloud  # fmt: skip
+    cloud = filter_of(IN_LIFT).cloud
     cloud.lag_variance = 0.01
     for hours, least_m, most_m in ((0.01, 0.1, 0.2), (1.0, 3.0, 5.0), (8.0, 20.0, 40.0)):
         before = cloud.lag_variance

@@ -17,7 +17,6 @@ from echostep.walls.echo_sources import Walls
 
 NONE, NO_RANGERS = np.zeros(0), np.zeros(0, np.int64)
 ROOM = Building(Walls(np.array([[0, 0, 12, 0], [12, 0, 12, 8], [12, 8, 0, 8], [0, 8, 0, 0]], float)), None)
-STEP_M = 0.5
 
 
 def pings(range_m: float, count: int, travel_m: float = 1.0) -> PingBatch:

@@ -9,20 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from board_runs import ELF, ROOT, TWIN
+from board_runs import ELF, TWIN
 from echostep.board.frames import encode
 from echostep.board.reports import SUBSCRIBE
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep_simulation.devices.board import BoardProcess
 from echostep_simulation.devices.foot_board import HEAD_START_MS
 from echostep_simulation.kits import Kit
 from echostep_simulation.scenario import DEMO_WAYPOINTS, START_NS, Scenario
+from walks import PLAN
 
 SECONDS = 24.0
-
-
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 
 
 class Walk(NamedTuple):

@@ -10,20 +10,19 @@ from board_runs import quiet_rows
 from echostep.board.calibration import PRESSURE_PA
 from echostep.height.height_filter import RelativeHeight
 from echostep.height.levels import HeightChange
-from echostep.localization import Building, FilterSettings, MapFilter, Start
+from echostep.localization import Start
 from echostep.odometry.barometer_start import BarometerStart
 from echostep.odometry.synchronizer import BAROMETER, MEASUREMENT, _measured
-from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import Pose, load_plan
+from echostep.path import PathSegment
+from echostep.plan import Pose
 from echostep.ports.chunks import BOARD, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep.walls.level_sheet import lay_out_levels
 from echostep_simulation.devices.board import PythonBoard
-from echostep_simulation.world.tower import LIFT_AT, STOREY_M, tower
-from walks import DEMO
+from echostep_simulation.world.tower import LIFT_AT, STOREY_M
+from localization.test_last_place import filter_of, standing
+from walks import PLAN
 
 RESET_M = 3_150.0  # the height of 68500 Pa
-SETTINGS = FilterSettings()
 
 
 def starts(heights_m: list[float], restarts: list[int] | None = None) -> list[int]:
@@ -53,7 +52,7 @@ def test_each_restart_of_the_board_may_bring_a_reset_value() -> None:
 
 
 def test_the_front_end_counts_it_and_says_so() -> None:
-    board, tracker = PythonBoard(), Tracker(load_plan(DEMO))
+    board, tracker = PythonBoard(), Tracker(PLAN)
     rows = quiet_rows(3000)
     rows["pressure"][:300] = round(68_500.0 / PRESSURE_PA)
     chunks = [Chunk(BOARD, t_ns, sent) for t_ns, sent in board.advance(rows)]
@@ -75,17 +74,12 @@ def test_a_segment_has_the_heights_since_the_newest_beginning() -> None:
 
 def test_a_ride_is_seen_although_the_first_readings_were_wrong() -> None:
     """Two storeys up; the readings of the first half second were the reset value."""
-    laid_out = lay_out_levels(tower(3))
-    building = Building(laid_out.walls, laid_out.sheet)
-    tracked = MapFilter(building, Start(Pose(*LIFT_AT, 0.0, 0), 0.05), 0.0, np.random.default_rng(1), SETTINGS)
+    tracked = filter_of(Start(Pose(*LIFT_AT, 0.0, 0), 0.05))
     ride_m = np.linspace(0.0, 2.0 * STOREY_M, 14).tolist()
     for k, height_m in enumerate(
         [RESET_M, *[100.0] * 12, *(100.0 + np.array(ride_m)).tolist(), *[100.0 + 2.0 * STOREY_M] * 12]
     ):
-        path = PathSegment(0.5 * k, 0.5 * k + 0.5, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0)
-        none, five = np.zeros(0), np.full(5, height_m)
-        measured = MeasuredSegment(path, none, np.zeros(0, np.int64), none, five, barometer_starts=int(k > 0))
-        found = tracked.update(measured).levels
+        found = tracked.update(standing(0.5 * k, height_m, int(k > 0))).levels
     assert found[2] > 0.99
 
 

@@ -16,7 +16,8 @@ from echostep.odometry import FrontEnd
 from echostep.ports.chunks import FOOT, Chunk, portion_of
 from echostep.settings import Settings
 from echostep.tracker import Tracker
-from odometry.foot_board_walk import PLAN, SECONDS, walk
+from odometry.foot_board_walk import SECONDS, walk
+from walks import PLAN
 
 pytestmark = needs_twin
 

@@ -6,8 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ from echostep.legs.trunk_path import GyroBlock, LegPath, WearerSettings, rotated
 from echostep.localization import Estimate, TrackStatus, digest
 from echostep.odometry.foot_legs_handover import ALIGNED_SD, KEPT_S, FootLegsHandover
 from echostep.path import PathSegment
-from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_simulation.devices.board import PythonBoard
@@ -26,11 +23,11 @@ from echostep_simulation.people.leg_angles import LegDimensions
 from echostep_simulation.people.walker import Person, walk
 from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
 from echostep_simulation.stimulus import BoardSensors
+from walks import PLAN
 
 pytestmark = pytest.mark.slow
 
 BEGIN_NS = 1_000_000_000
-PLAN = load_plan(Path(str(files("echostep"))) / "plans" / "demo.json")
 
 
 @cache

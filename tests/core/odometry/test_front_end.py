@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from board_runs import ROOT
 from echostep.arrays import Floats, Ints
 from echostep.board.calibration import GyroSettings, RangerSettings, ranges
 from echostep.board.frames import encode
@@ -27,16 +26,15 @@ from echostep.legs.trunk_path import GyroBlock
 from echostep.odometry import FrontEnd, WearerWatch
 from echostep.odometry.synchronizer import BLIND_S, MAX_WAITING, MEASUREMENT, PING_AGE_S, SILENCE_S, Synchronizer
 from echostep.path import Dropout, MeasuredSegment, PathSegment
-from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import MtxTiming
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.devices.mtx import MtxModel
 from echostep_simulation.scenario import DEMO_WAYPOINTS, Scenario
+from walks import PLAN
 
 Told = list[tuple[object, ...]]
 CORRECTED = 25_000  # chunks
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 
 
 @cache

@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from board_runs import ROOT
 from echostep.arrays import Floats
 from echostep.board.calibration import RangerSettings
 from echostep.echoes.likelihood import EchoSettings, echo_model
@@ -19,13 +18,13 @@ from echostep.foot.trunk_path import GaitSettings
 from echostep.localization import Building
 from echostep.odometry import FrontEnd
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.settings import parse_settings
 from echostep.timing.timeline import MtxTiming
 from echostep.walls.echo_sources import Walls
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
+from walks import PLAN
 
 AHEAD_DEG, HEADING_RAD = 20.0, 0.7
 # A ranger that looks ahead looks less far from the heading, on either side.
@@ -44,8 +43,7 @@ def step() -> MeasuredSegment:
 def pinged(ahead_deg: float) -> list[MeasuredSegment]:
     """The segments with pings that the front end makes of a short walk."""
     ours = FrontEnd(MtxTiming(), RangerSettings(ahead_deg=ahead_deg), FootSettings(), GaitSettings())
-    plan = load_plan(ROOT / "host/core/echostep/plans/demo.json")
-    chunks: list[Chunk] = list(Scenario(plan, ((2.0, 7.5), (5.0, 7.5)), 5, PythonBoard(5)).chunks())
+    chunks: list[Chunk] = list(Scenario(PLAN, ((2.0, 7.5), (5.0, 7.5)), 5, PythonBoard(5)).chunks())
     pieces = ours.process(portion_of(chunks))
     return [piece for piece in pieces if isinstance(piece, MeasuredSegment) and len(piece.t_s)]
 

@@ -94,12 +94,6 @@ def expect_every_frame(path: Path) -> None:
     assert [(message.bus, message.mid) for message in found] == expected
 
 
-def test_a_false_frame_at_the_end_hides_none(tmp_path: Path) -> None:
-    """The long false header asks for 2048 bytes that never come; three frames stand behind it."""
-    capture = legacy(1) + b"\xfa\xff\x32\xff\x08\x00" + legacy(2) + legacy(3) + legacy(4)
-    assert [message.counter for message in decoded(capture, tmp_path)] == [1, 2, 3, 4]
-
-
 def test_a_frame_behind_much_noise_is_found(tmp_path: Path) -> None:
     assert [message.counter for message in decoded(bytes(200_000) + legacy(9), tmp_path)] == [9]
 

@@ -14,12 +14,11 @@ import pytest
 from echostep.board.frames import BoardReader, encode
 from echostep.board.messages import Gyros
 from echostep.localization import Estimate, TrackStatus
-from echostep.plan import load_plan
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.timing.timeline import FIRST_MESSAGE, PLAIN, MtxTiming, Timeline
 from echostep.tracker import Tracker
 from timing.messages import MS, Message, times_of
-from walks import DEMO, walk_chunks
+from walks import PLAN, walk_chunks
 
 SECOND = 1_000 * MS
 
@@ -134,7 +133,7 @@ def test_crystals_200_ppm_apart_that_drift_with_temperature(ppm: float, wired: b
 
 
 def track(chunks: Sequence[Chunk]) -> tuple[list[Estimate], Tracker]:
-    tracker = Tracker(load_plan(DEMO), None, None, 1)
+    tracker = Tracker(PLAN, None, None, 1)
     return tracker.take(portion_of(chunks)), tracker
 
 

@@ -10,16 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from board_runs import ELF, ROOT, TWIN, needs_twin
+from board_runs import ELF, TWIN, needs_twin
 from echostep.localization import Estimate, TrackStatus, digest
-from echostep.plan import Plan, Pose, load_plan
+from echostep.plan import Plan, Pose
 from echostep.ports.chunks import BOARD, MTX, Chunk, portion_of
 from echostep.tracker import Tracker
 from echostep_simulation.devices.board import BoardProcess, PythonBoard
 from echostep_simulation.scenario import Scenario, demo_scenario
-from walks import errors_of
+from walks import PLAN, errors_of
 
-PLAN = load_plan(ROOT / "host/core/echostep/plans/demo.json")
 WAYPOINTS = ((2.0, 7.5), (9.5, 7.5), (9.5, 10.8), (9.5, 7.5), (18.0, 7.5))
 
 

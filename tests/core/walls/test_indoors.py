@@ -12,16 +12,14 @@ from echostep.arrays import Floats
 from echostep.localization import Building, MapFilter, Start
 from echostep.particles.limits import PROBABLE
 from echostep.path import MeasuredSegment, PathSegment
-from echostep.plan import Pose, load_plan
+from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.floor import Indoors, indoors, walkable_floor
-from walks import DEMO
+from walks import PLAN
 
 # A room of 8 m by 6 m with a door of 1 m in its south wall.
 ROOM = np.array([[0, 0, 3.5, 0], [4.5, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0]], float)
 FRONT_M = 0.75  # from the outermost wall: nearer places count as indoors
-
-PLAN = load_plan(DEMO)
 
 
 def of(walls: Floats) -> Indoors:

@@ -20,17 +20,22 @@ STEP_SD_M, STEP_M, COUNT = 0.03, 0.9, 61  # of each step of path; its length; no
 COURSE = 17  # the first node more than 15 m from the start
 
 
+def path_alone(pose: Floats, way_m: Floats, turn_sd_rad: float, closures: list[Closure]) -> Graph:
+    """A path (n, 3) that has heard no wall."""
+    gaps = len(pose) - 1
+    nodes = Nodes(way_m, pose, np.full(gaps, STEP_SD_M), np.full(gaps, turn_sd_rad), way_m)
+    none, integers = np.zeros(0), np.zeros(0, np.int64)
+    pieces = Fragments(integers, np.zeros((0, 2)), none, none, none, none, integers, integers)
+    graph = Graph(nodes, pieces, pose.copy(), FittedWalls(none, none, integers), closures)
+    graph.solve()
+    return graph
+
+
 def straight(turn_sd_rad: float, closures: list[Closure] | None = None) -> Graph:
     """A path along the x axis."""
     pose = np.zeros((COUNT, 3))
     pose[:, 0] = STEP_M * np.arange(COUNT)
-    gaps = COUNT - 1
-    nodes = Nodes(pose[:, 0], pose, np.full(gaps, STEP_SD_M), np.full(gaps, turn_sd_rad), pose[:, 0])
-    none, integers = np.zeros(0), np.zeros(0, np.int64)
-    pieces = Fragments(integers, np.zeros((0, 2)), none, none, none, none, integers, integers)
-    graph = Graph(nodes, pieces, pose.copy(), FittedWalls(none, none, integers), closures or [])
-    graph.solve()
-    return graph
+    return path_alone(pose, pose[:, 0], turn_sd_rad, closures or [])
 
 
 def sds(graph: Graph, node: int) -> Floats:

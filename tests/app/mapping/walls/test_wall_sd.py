@@ -11,14 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats, Ints
-from echostep_app.mapping.graph.fragments import Fragments
-from echostep_app.mapping.graph.graph import Closure, FittedWalls, Graph
-from echostep_app.mapping.graph.nodes import Nodes, Pings
+from echostep_app.mapping.graph.graph import Closure, Graph
+from echostep_app.mapping.graph.nodes import Pings
 from echostep_app.mapping.walls.lines import Lines
 from echostep_app.mapping.walls.segments import Run
 from echostep_app.mapping.walls.wall_sd import distance_derivatives, distance_variances, wall_sds
+from mapping.walls.test_place_sd import STEP_SD_M, path_alone
 
-STEP_SD_M = 0.03  # of each metre of path
 COUNT = 21  # nodes of a passage, a metre apart
 LINE_SD_M = 0.03
 
@@ -28,13 +27,7 @@ def there_and_back(closures: list[Closure]) -> Graph:
     x = np.arange(COUNT, dtype=np.float64)
     pose = np.zeros((2 * COUNT, 3))
     pose[:, 0], pose[COUNT:, 1] = np.concatenate([x, x[::-1]]), 1.0
-    gaps = 2 * COUNT - 1
-    nodes = Nodes(np.arange(2.0 * COUNT), pose, np.full(gaps, STEP_SD_M), np.full(gaps, 1e-4), np.arange(2.0 * COUNT))
-    none, integers = np.zeros(0), np.zeros(0, np.int64)
-    pieces = Fragments(integers, np.zeros((0, 2)), none, none, none, none, integers, integers)
-    graph = Graph(nodes, pieces, pose.copy(), FittedWalls(none, none, integers), closures)
-    graph.solve()
-    return graph
+    return path_alone(pose, np.arange(2.0 * COUNT), 1e-4, closures)
 
 
 def pings_of(graph: Graph, node: Ints) -> tuple[Pings, Floats]:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from board_runs import ROOT
 from echostep_app.page.editor import EditServer
+from walks import DEMO
 
-DEMO = ROOT / "host/core/echostep/plans/demo.json"
 PICTURE = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="400" height="300">'
     '<rect x="50" y="50" width="300" height="200" fill="none" stroke="#888" stroke-width="8"/></svg>'

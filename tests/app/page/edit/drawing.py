@@ -6,17 +6,14 @@ With ECHOSTEP_PICTURES=1 the pictures of the manual are made anew.
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
-from board_runs import ROOT
 from echostep.plan import load_plan
 from echostep_app.page.editor import EditServer
 from page.browser import loaded_page, spot
 from waiting import until
 
 PHONES = {"upright": (360, 740), "sideways": (740, 360)}
-PICTURES = ROOT / "host/pictures" if os.environ.get("ECHOSTEP_PICTURES") else None
 
 
 def opened(browser: Any, server: EditServer, **context: Any) -> Any:

@@ -10,15 +10,13 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from board_runs import ROOT
 from echostep.errors import EchostepError
 from echostep.plan import load_plan, parse_plan
 from echostep_app.page import editor as plan_edit
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.writer import plan_json, save_plan
 from waiting import PATIENCE_S
-
-DEMO = ROOT / "host/core/echostep/plans/demo.json"
+from walks import PLAN
 
 
 def asked(
@@ -39,7 +37,7 @@ def test_the_page_the_plan_and_nothing_else(served: EditServer) -> None:
     token = urlsplit(served.url).path
     assert asked(served, "")[0] == 200
     status, raw, headers = asked(served, "plan")
-    assert (status, raw.decode()) == (200, plan_json(load_plan(DEMO)))
+    assert (status, raw.decode()) == (200, plan_json(PLAN))
     assert "default-src 'none'" in headers["content-security-policy"]
     assert asked(served, "picture")[0] == 204
     assert asked(served, "edit/geometry.js")[2]["content-type"].startswith("text/javascript")
@@ -78,7 +76,7 @@ def test_what_is_no_plan_is_refused_by_its_field(served: EditServer, body: bytes
 
 
 def test_other_sites_and_wrong_tokens_cannot_post(served: EditServer) -> None:
-    before, body = served.file.path.read_bytes(), plan_json(load_plan(DEMO)).encode()
+    before, body = served.file.path.read_bytes(), plan_json(PLAN).encode()
     assert asked(served, "plan", body, origin="http://evil.example")[0] == 404
     assert asked(served, "plan", body, origin="null")[0] == 404
     assert asked(served, "plan", body, host="evil.example")[0] == 404

@@ -17,8 +17,8 @@ from echostep_app.plan.importers.formats import import_plan
 from echostep_app.plan.importers.summary import doors_in_gaps
 from echostep_app.plan.questions import with_questions
 from echostep_app.plan.writer import save_plan
-from page.browser import violations, wait_for
-from page.edit.drawing import PICTURES, click, drag, opened
+from page.browser import PICTURES, violations, wait_for
+from page.edit.drawing import click, drag, opened
 from plan.drawings.drawn_houses import DOOR, WALL, house, sheet
 
 LEFT_OUT = {"layer": "X-NEW"}

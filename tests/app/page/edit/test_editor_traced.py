@@ -17,8 +17,8 @@ from echostep_app.plan.places.faces import OUTSIDE
 from echostep_app.plan.places.spaces import find_spaces
 from echostep_app.plan.questions import with_questions
 from echostep_app.plan.writer import save_plan
-from page.browser import spot, wait_for
-from page.edit.drawing import PICTURES, opened, status
+from page.browser import PICTURES, spot, wait_for
+from page.edit.drawing import opened, status
 from page.edit.traced_house import PIXEL_M, ROOMS, draw, room_middles
 
 MOST_STROKES = 40

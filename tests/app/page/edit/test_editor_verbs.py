@@ -15,8 +15,8 @@ from echostep.plan import load_plan, parse_plan
 from echostep_app.page.editor import EditServer
 from echostep_app.plan.check import check_plan
 from echostep_app.plan.writer import save_plan
-from page.browser import overflow, spot, violations, wait_for
-from page.edit.drawing import PHONES, PICTURES, answers, click, drag, on_phone, opened, saved, says, status, tap
+from page.browser import PICTURES, overflow, spot, violations, wait_for
+from page.edit.drawing import PHONES, answers, click, drag, on_phone, opened, saved, says, status, tap
 from waiting import until
 
 HOUSE = {

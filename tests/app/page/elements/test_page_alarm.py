@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ from echostep.odometry import Alarm, AlarmKind, AlarmReason, WearerWatch
 from echostep.ports.people.check_in import Call
 from echostep_app.page.elements.alarm import ShownAlarm, shown_alarm
 from echostep_app.page.mailbox import popped
-from echostep_app.page.requests import parse_request
 from page.browser import looking, picture, violations, wait_for
 from page.frames import scene, served
 from waiting import until
@@ -59,13 +57,6 @@ def test_who_is_in_distress_is_told_who_knows_of_it() -> None:
     assert shown
     assert shown.text == "Mayday: you asked for help. Ann has acknowledged it."
     assert "Ann has acknowledged it." in shown.spoken
-
-
-def test_calls_are_requests_and_half_a_call_is_none() -> None:
-    assert parse_request('{"kind":"call","help":true}') == Call(help=True)
-    assert parse_request('{"kind":"call","help":false}') == Call(help=False)
-    for wrong in ({}, {"help": 1}, {"help": None}):
-        assert parse_request(json.dumps({"kind": "call"} | wrong)) is None
 
 
 @pytest.mark.parametrize("look", ["bright", "dark"])

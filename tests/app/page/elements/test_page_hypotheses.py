@@ -20,9 +20,9 @@ from echostep_app.page.elements.scene import status_text
 from echostep_app.page.elements.taps import Taps
 from echostep_app.page.live import LivePage
 from echostep_app.plan.routing import Route, Stretch
-from page.browser import READY, Walk, loaded_page, looking, picture, wait_for
+from page.browser import READY, Walk, loaded_page, looking, painted, picture, wait_for
 from page.frames import LOCAL, PLAN, scene, served, told
-from page.test_page_browser import STILL, ink_near
+from page.test_page_browser import NEAR_PX, STILL
 
 PLACES = (LikelyPlace(0.62, 5.0, 7.5, 0, 0.4, 0.0), LikelyPlace(0.31, 5.0, 2.0, 0, 0.4, 0.0))
 SEARCHED_S = 9.0  # of the demo's walk: along one of two corridors that are alike
@@ -136,7 +136,7 @@ def test_the_way_is_hidden_while_no_place_is_claimed(browser: Any) -> None:
             mailbox.publish(replace(scene(t_s), estimate=told(13.0, 5.0, t_s, status), guidance=way))
             wait_for(page, f"echostep.last.t_s === {t_s} && {STILL}")
             assert page.evaluate("echostep.last.guidance.path.length") == 2
-            assert [ink_near(page, 2.0 + 7.5 * share, 7.5) for share in (0.1, 0.5, 0.9)] == [shown] * 3
+            assert [painted(page, "goal", 2.0 + 7.5 * share, 7.5, NEAR_PX) for share in (0.1, 0.5, 0.9)] == [shown] * 3
         assert not page.wrong
 
 

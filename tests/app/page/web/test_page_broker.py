@@ -20,8 +20,8 @@ from page.browser import HELD_MS, READY, TABLE_READY, loaded_page, overflow, wai
 from page.web.test_page_silence import OUTBOX, STATUS, WITHIN_S
 from page.web.test_page_sizes import SIZES, UNREACHED
 from team.team_broker import Broker, needs_broker
-from team.team_reports import PLAN
 from waiting import PATIENCE_S
+from walks import DEMO
 
 ROW = "document.querySelector('#list li .said').textContent"
 WAITING = "Requests that wait for the broker: 1"
@@ -72,7 +72,7 @@ def outage(wearer: Any, table: Any, begin: Callable[[], None], end: Callable[[],
 def test_a_dead_or_frozen_broker_is_told(browser: Any, tmp_path: Path, begin: str, end: str) -> None:
     with Broker(tmp_path) as broker:
         walk = f"demo --speed 0.5 --port 0 --publish {broker.url} --name anna --out {tmp_path / 'demo'}".split()
-        follow = ("command", broker.url, "--plan", PLAN, "--port", 0, "--out", tmp_path / "operation.mcap")
+        follow = ("command", broker.url, "--plan", DEMO, "--port", 0, "--out", tmp_path / "operation.mcap")
         with program(*follow) as table_url, program(*walk, "--page", "--no-open") as wearer_url:
             how = {"viewport": dict(zip(("width", "height"), SIZES[1], strict=True))}
             wearer = loaded_page(browser, wearer_url, how, READY)

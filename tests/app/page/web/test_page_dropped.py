@@ -20,12 +20,12 @@ from echostep_app.page.mailbox import Mailbox
 from echostep_app.page.server import Address
 from echostep_app.page.web import uploads
 from echostep_app.plan.writer import plan_json
-from echostep_app.recording.recorder import Recorder
 from echostep_app.session.metadata import run_metadata
 from echostep_app.session.runs import dropped
 from page.browser import loaded_page, overflow, violations, wait_for
 from page.frames import PLAN, scene, served
 from page.web.test_page_sizes import SIZES, UNREACHED
+from recording.damages import write_recording
 from waiting import PATIENCE_S
 from walks import walk_chunks
 
@@ -45,9 +45,7 @@ OTHER = replace(PLAN, name="Other building")
 def recording(folder: Path, plan: Plan, name: str = "walk.mcap") -> Path:
     """A short walk on a plan, recorded."""
     path = folder / name
-    with Recorder(path, run_metadata(plan, plan.start, 1, "", source="simulated")) as recorder:
-        for chunk in walk_chunks(6.0):
-            recorder.write(chunk)
+    write_recording(path, walk_chunks(6.0), run_metadata(plan, plan.start, 1, "", source="simulated"))
     return path
 
 

@@ -18,8 +18,8 @@ from echostep_app.page.elements.scene import TruePath
 from echostep_app.page.live import LivePage
 from echostep_app.session.options import OutputOptions
 from echostep_app.session.session import Session
-from page.browser import LOCAL, PLAN, SETTLED, loaded_page, opened_page, wait_for
-from page.frames import scene, served
+from page.browser import SETTLED, loaded_page, opened_page, wait_for
+from page.frames import LOCAL, PLAN, scene, served
 from walks import walk_chunks
 
 ENDED = "ended: mean error 0.06 m, at most 0.16 m. ▶ plays it again"

@@ -19,7 +19,8 @@ from echostep.tracker import Tracker
 from echostep_app.page.live import LivePage
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
-from page.browser import LOCAL, PHONE, READY, loaded_page, spot, wait_for
+from page.browser import PHONE, READY, loaded_page, spot, wait_for
+from page.frames import LOCAL
 from plan.imported_plans import seven_floors
 from waiting import until
 

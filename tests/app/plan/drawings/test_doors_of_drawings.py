@@ -21,6 +21,7 @@ from plan.drawings import drawn_offices as drawn
 from plan.drawings.drawn_doors import DOOR_STYLES, Doors, Layer, Leaf, leaves_alone, nothing
 from plan.drawings.drawn_houses import DOOR, OTHER, WALL, corners, house, outlines, sheet, write_house
 from plan.drawings.drawn_offices import WALL_STYLES, Walls, write_office
+from plan.imported_plans import imported_file
 
 TURN = 33.0
 ROOM_M2 = 5.88 * 4.63  # R2, between its walls
@@ -78,8 +79,8 @@ def test_rooms_behind_gaps_are_asked_about_at_once(tmp_path: Path) -> None:
 
 def test_double_doors_without_a_swing_are_told(tmp_path: Path) -> None:
     """Single leaves drawn open lie in their gaps, that in the corner too; of two that face each other none fits the gap."""
-    report = ImportReport()
-    level = import_plan(write_office(tmp_path / "a.dxf", door=leaves_alone), report=report).levels[0]
+    plan, report = imported_file(write_office(tmp_path / "a.dxf", door=leaves_alone))
+    level = plan.levels[0]
     assert (len(level.doors), doors_in_gaps(level)) == (6, 6)
     assert report.left_out["door in no wall"] == 2
     assert [question.text for question in level.questions] == ["door in no wall, left out: is it a door?"] * 2
@@ -87,8 +88,8 @@ def test_double_doors_without_a_swing_are_told(tmp_path: Path) -> None:
 
 def imported(doc: Any, folder: Path) -> tuple[Level, ImportReport]:
     doc.saveas(folder / "a.dxf")
-    report = ImportReport()
-    return import_plan(folder / "a.dxf", report=report).levels[0], report
+    plan, report = imported_file(folder / "a.dxf")
+    return plan.levels[0], report
 
 
 def test_walls_keep_their_jambs(tmp_path: Path) -> None:

@@ -18,15 +18,14 @@ from ezdxf.render.mesh import MeshBuilder
 from echostep.errors import EchostepError
 from echostep.plan import Plan
 from echostep_app.plan.importers.dxf.layers import LAYERS, meaning, patterns_of
-from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import Hints, ImportReport
+from echostep_app.plan.importers.report import ImportReport
 from plan.drawings.drawn_houses import WALL, boxes, corners, house, outlines, sheet
+from plan.imported_plans import imported_file
 
 
 def imported(doc: Any, folder: Path, **hints: Any) -> tuple[Plan, ImportReport]:
     doc.saveas(folder / "a.dxf")
-    report = ImportReport()
-    return import_plan(folder / "a.dxf", Hints(**hints), report=report), report
+    return imported_file(folder / "a.dxf", **hints)
 
 
 def length_m(plan: Plan) -> float:

@@ -15,9 +15,10 @@ from echostep.errors import EchostepError
 from echostep_app.commands.options import scale_of as scale_option
 from echostep_app.plan.importers.dxf.frame import METRES
 from echostep_app.plan.importers.formats import import_plan
-from echostep_app.plan.importers.report import Hints, ImportReport
+from echostep_app.plan.importers.report import Hints
 from echostep_app.plan.importers.summary import size_m
 from plan.drawings.drawn_houses import WALL, house, sheet
+from plan.imported_plans import imported_file
 
 
 def named_house(space: Any, x: float, y: float, begin: float, name: str) -> None:
@@ -33,14 +34,12 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
     named_house(space, 0, 0, 3.0, "Hall")
     named_house(space, 15, 0.5, 5.0, "Loft")
     doc.saveas(tmp_path / "a.dxf")
-    report = ImportReport()
-    import_plan(tmp_path / "a.dxf", report=report)
+    _, report = imported_file(tmp_path / "a.dxf")
     assert "looks like 2 storeys beside each other" in report.doubts[0]
     words = report.doubts[0].split("--window ")[1:]
     windows = [tuple(float(v) for v in word.strip().split(",")) for word in words]
-    hints = Hints(windows=windows, level_names=["Ground", "Upper"], storey_height_m=3.0)
-    report = ImportReport()
-    plan = import_plan(tmp_path / "a.dxf", hints, report=report)
+    names = ["Ground", "Upper"]
+    plan, report = imported_file(tmp_path / "a.dxf", windows=windows, level_names=names, storey_height_m=3.0)
     assert report.doubts == []
     assert [(level.name, level.height_m) for level in plan.levels] == [("Ground", 0.0), ("Upper", 3.0)]
     assert [size_m(level) for level in plan.levels] == [pytest.approx((10, 8), abs=0.01)] * 2
@@ -51,8 +50,8 @@ def test_several_storeys_in_one_drawing(tmp_path: Path) -> None:
 
 def test_rows_of_rooms_that_doors_join_are_one_storey() -> None:
     """The office of the manual's pictures: nothing but the doors at both ends of its corridor joins the rows."""
-    report = ImportReport()
-    (level,) = import_plan(ROOT / "tests/captures/office.dxf", report=report).levels
+    plan, report = imported_file(ROOT / "tests/captures/office.dxf")
+    (level,) = plan.levels
     assert (report.doubts, len(level.rooms), len(level.doors)) == ([], 12, 14)
 
 
@@ -73,11 +72,9 @@ def test_storeys_drawn_apart(tmp_path: Path) -> None:
         house(space, x=x, y=y, door=True)
         doc.saveas(tmp_path / f"{name}.dxf")
     files = tmp_path / "ground.dxf", [tmp_path / "first.dxf"]
-    report = ImportReport()
-    import_plan(files[0], Hints(), files[1], report)
+    _, report = imported_file(*files)
     assert report.doubts == ["first.dxf does not lie over ground.dxf: --align lays the storeys over each other"]
-    report = ImportReport()
-    plan = import_plan(files[0], Hints(align=True), files[1], report)
+    plan, report = imported_file(*files, align=True)
     assert report.doubts == []
     assert plan.levels[1].doors[0].line == pytest.approx(plan.levels[0].doors[0].line, abs=0.05)
 
@@ -98,8 +95,7 @@ def test_different_units_that_are_right(tmp_path: Path) -> None:
         doc, space = sheet(code)
         house(space, one=metre, door=True)
         doc.saveas(tmp_path / f"{name}.dxf")
-    report = ImportReport()
-    plan = import_plan(tmp_path / "ground.dxf", Hints(), [tmp_path / "first.dxf"], report)
+    plan, report = imported_file(tmp_path / "ground.dxf", [tmp_path / "first.dxf"])
     assert [size_m(level) for level in plan.levels] == [pytest.approx((10, 8), abs=0.01)] * 2
     assert report.units == "cm ($INSUNITS; sizes fit); mm ($INSUNITS; sizes fit)"
 
@@ -133,8 +129,7 @@ def test_a_unit_that_is_wrong_is_refused_with_the_right_one(tmp_path: Path, draw
 
 def test_a_unit_that_is_possible_but_odd_is_told(tmp_path: Path) -> None:
     """Drawn in cm, called inches: a building of 25 m with walls 0.76 m thick may be, but hardly."""
-    report = ImportReport()
-    import_plan(drawing(tmp_path / "a.dxf", "cm", "in", door=False), report=report)
+    _, report = imported_file(drawing(tmp_path / "a.dxf", "cm", "in", door=False))
     assert "another unit" in report.doubts[0]
     assert report.doubts[0].endswith("in centimetres: --units cm?")
 

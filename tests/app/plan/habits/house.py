@@ -94,12 +94,6 @@ def boxes(storey: int, thick: float = 0.2) -> list[Line]:
     return rows
 
 
-def corners(box: Line) -> list[Point]:
-    """The corners of a rectangle."""
-    x0, y0, x1, y1 = box
-    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-
-
 def middle(line: Line) -> Point:
     """The middle of a line."""
     return (line[0] + line[2]) / 2, (line[1] + line[3]) / 2

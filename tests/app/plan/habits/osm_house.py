@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from plan.habits.house import ENTRANCE, HIGH, INNER, PARTITION, STAIRS, STOREYS, WIDE, Move, Point, corners, middle
+from plan.drawings.drawn_houses import corners
+from plan.habits.house import ENTRANCE, HIGH, INNER, PARTITION, STAIRS, STOREYS, WIDE, Move, Point, middle
 
 Row = dict[str, Any]
 

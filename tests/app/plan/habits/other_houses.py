@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from plan.habits.house import HIGH, ROOMS, STAIRS, STOREYS, WIDE, Line, Move, axes, boxes, corners, doors_on
+from plan.drawings.drawn_houses import corners
+from plan.habits.house import HIGH, ROOMS, STAIRS, STOREYS, WIDE, Line, Move, axes, boxes, doors_on
 
 Rows = dict[str, list[dict[str, Any]]]
 

@@ -7,7 +7,6 @@ import json
 import socket
 import ssl
 import subprocess
-import sys
 import threading
 import time
 from functools import partial
@@ -16,6 +15,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from command_line import PROGRAM
 from echostep.errors import EchostepError
 from echostep_app.cli import app
 from echostep_app.team import outbox
@@ -26,11 +26,9 @@ from echostep_app.team.outbox import Outbox
 from free_ports import free_port
 from team.network import at, box_to
 from team.team_broker import Broker, Certificates, needs_broker
-from team.team_reports import PLAN, report
+from team.team_reports import report
 from waiting import PATIENCE_S, ends, until
-
-ECHOSTEP = [sys.executable, "-m", "echostep"]
-
+from walks import DEMO
 
 pytestmark = pytest.mark.usefixtures("quick")
 
@@ -194,7 +192,7 @@ def test_events_go_out_by_tls_with_a_client_certificate(certificates: Certificat
 def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker:
         commander = subprocess.Popen(
-            [*ECHOSTEP, "command", "--plan", PLAN, broker.url, "--json", "--seconds", "300",
+            [*PROGRAM, "command", "--plan", DEMO, broker.url, "--json", "--seconds", "300",
              "--out", tmp_path / "operation.mcap"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
@@ -202,7 +200,7 @@ def test_a_demo_is_published_and_commanded(tmp_path: Path) -> None:
             box = box_to(broker.url, name="bob")
             box.offer(report("bob", status="lost"))
             demo = subprocess.run(
-                [*ECHOSTEP, "demo", "--headless", "--out", tmp_path / "demo", "--name", "anna", "--team", "red",
+                [*PROGRAM, "demo", "--headless", "--out", tmp_path / "demo", "--name", "anna", "--team", "red",
                  "--publish", broker.url, "--publish", "mqtt://127.0.0.1:9"],
                 capture_output=True, text=True, timeout=3.0 * PATIENCE_S, check=False,
             )  # fmt: skip
@@ -231,11 +229,11 @@ def _replays_alike(folder: Path) -> None:
     """Published or not, the track is the same; Cursor on Target goes out where the plan lies on Earth."""
     plan = folder / "placed.json"
     plan.write_text(
-        json.dumps(json.loads(PLAN.read_text()) | {"georeference": {"origin": [16.37, 48.2], "rotation_deg": 20.0}})
+        json.dumps(json.loads(DEMO.read_text()) | {"georeference": {"origin": [16.37, 48.2], "rotation_deg": 20.0}})
     )
     replay = partial(subprocess.run, capture_output=True, timeout=3.0 * PATIENCE_S, check=True)
-    command = [*ECHOSTEP, "replay", folder / "demo/walk.mcap", "--headless", "--out"]
-    replay([*command, folder / "quiet", "--plan", PLAN])
+    command = [*PROGRAM, "replay", folder / "demo/walk.mcap", "--headless", "--out"]
+    replay([*command, folder / "quiet", "--plan", DEMO])
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         ear.bind(("127.0.0.1", 0))
@@ -257,9 +255,9 @@ def _replays_alike(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["command", "--plan", PLAN, "http://x"], "mqtt://"),
+        (["command", "--plan", DEMO, "http://x"], "mqtt://"),
         (["command", "--plan", "none.json", "mqtt://x"], "none.json"),
-        (["command", "--plan", PLAN, "mqtt://x", "--team", "a/b"], "--team"),
+        (["command", "--plan", DEMO, "mqtt://x", "--team", "a/b"], "--team"),
         (["demo", "--headless", "--publish", "mqtt://x"], "--name"),
         (["demo", "--headless", "--publish", "mqtt://x", "--name", "a#"], "--name"),
         (["demo", "--headless", "--publish", "cot+udp://x", "--name", "a", "--plan", "nowhere.json"], "georeference"),
@@ -267,7 +265,7 @@ def _replays_alike(folder: Path) -> None:
 )
 def test_a_mistake_is_named_in_one_line(tmp_path: Path, arguments: list[object], named: str) -> None:
     more = ["--out", tmp_path] if arguments[0] == "demo" else []
-    tree = {key: value for key, value in json.loads(PLAN.read_text()).items() if key != "georeference"}
+    tree = {key: value for key, value in json.loads(DEMO.read_text()).items() if key != "georeference"}
     (tmp_path / "nowhere.json").write_text(json.dumps(tree))
     arguments = [tmp_path / name if name == "nowhere.json" else name for name in arguments]
     with pytest.raises(EchostepError, match=named) as found:

@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from echostep.plan import load_plan
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.check_in import PERSON, Call
 from echostep.tracker import Tracker
@@ -17,7 +16,8 @@ from echostep_app.team.endpoint import Outlet
 from echostep_app.team.messages.report import BadReportError, ReportedAlarm, decode, encode
 from echostep_app.team.publish import Publishing
 from team.cot.test_cot_schema import faults
-from team.team_reports import PLACE, PLAN, report
+from team.team_reports import PLACE, report
+from walks import PLAN
 
 MAYDAY = ReportedAlarm("mayday", "no motion", 3, 34.0)
 OVER = ReportedAlarm("over", "no motion", 3, 2.0)
@@ -81,7 +81,7 @@ def test_an_alarm_in_words(alarm: ReportedAlarm, words: str) -> None:
 
 
 def test_a_call_for_help_is_reported_although_no_estimate_comes() -> None:
-    tracker = Tracker(load_plan(PLAN))
+    tracker = Tracker(PLAN)
     publishing = Publishing(Outlet((), "anna", "red"), tracker, "live", print)
     assert publishing._last.alarm is None
     publishing.publish(tracker.feed(Chunk(PERSON, 0, Call(help=True).encode())))

@@ -11,14 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aiding.team.two_wearers import BUILDING, PLAN
+from aiding.team.two_wearers import BUILDING, filter_at
 from echostep.aiding import AidedFilter, MeetingEffect, on_the_way, start_at
 from echostep.aiding.team.meeting import WRONG, Meeting, covariance
 from echostep.aiding.team.meeting_memory import MOST_NAMES, PLACE_M, RENEWED_M, MeetingMemory
 from echostep.aiding.team.meetings import best_omega, information, places_at, weigh
 from echostep.arrays import Floats
 from echostep.localization import CloudSettings, Start
-from echostep.localization.belief import Belief
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.localization.particles.start import STATED
 from echostep.path import Odometer, PathSegment
@@ -26,7 +25,7 @@ from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.meeting import MEETING, MeetingMessage, parse_meeting
 from echostep.tracker import Tracker
-from walks import walk_chunks
+from walks import PLAN, walk_chunks
 
 AREA_M2 = 250.0
 KIM = Meeting("kim", "tracking", 4.0, 5.0, 0, 0.01, 0.0, 0.01)
@@ -46,12 +45,6 @@ def cloud(mean: tuple[float, float], sd: tuple[float, float], size: int = 20_000
 def moments(c: Cloud) -> tuple[Floats, Floats]:
     place = np.column_stack([c.x_m, c.y_m])
     return c.weight @ place, np.cov(place, rowvar=False, aweights=c.weight, bias=True)
-
-
-def filter_at(x_m: float, y_m: float, right: float) -> AidedFilter:
-    made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0)), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
-    return made
 
 
 variances = st.tuples(st.floats(0.01, 9.0), st.floats(0.01, 9.0), st.floats(-0.9, 0.9))
@@ -148,7 +141,7 @@ def test_two_who_meet_again_and_again_do_not_become_sure() -> None:
 
 def test_a_teammate_elsewhere_does_not_pull_a_sure_cloud() -> None:
     """Nor do two of them; not a bit of it changes."""
-    sure = filter_at(4.0, 7.5, 0.9999)
+    sure = filter_at(4.0, 7.5, right=0.9999)
     before, drawn = sure.cloud.x_m.copy(), sure._rng.bit_generator.state
     for name in ("eve", "mallory"):
         assert sure.meet(replace(FAR, name=name)) is MeetingEffect.CONTRADICTS
@@ -158,14 +151,14 @@ def test_a_teammate_elsewhere_does_not_pull_a_sure_cloud() -> None:
 
 
 def test_a_stated_start_is_given_up_when_a_second_teammate_contradicts() -> None:
-    stated = filter_at(4.0, 7.5, STATED)
+    stated = filter_at(4.0, 7.5, right=STATED)
     assert stated.meet(ANNA) is MeetingEffect.CONTRADICTS
     assert stated.meet(ANNA) is MeetingEffect.REPEATED
     assert stated.meet(BO) is MeetingEffect.MOVED
 
 
 def test_an_agreement_answers_a_contradiction() -> None:
-    stated = filter_at(4.0, 7.5, STATED)
+    stated = filter_at(4.0, 7.5, right=STATED)
     beside = Meeting("kim", "tracking", 4.3, 7.4, 0, 0.01, 0.0, 0.01)
     effects = [stated.meet(met) for met in (ANNA, beside, BO)]
     assert effects == [MeetingEffect.CONTRADICTS, MeetingEffect.USED, MeetingEffect.CONTRADICTS]
@@ -175,7 +168,7 @@ def test_an_agreement_answers_a_contradiction() -> None:
 def test_a_near_radio_range_moves_a_doubted_cloud_about_the_teammate_and_a_far_one_none(
     range_m: float, moved: bool
 ) -> None:
-    doubted = filter_at(4.0, 7.5, 0.4)
+    doubted = filter_at(4.0, 7.5, right=0.4)
     effect = doubted.meet(replace(FAR, range_m=range_m, range_sd_m=0.1))
     assert effect is (MeetingEffect.MOVED if moved else MeetingEffect.CONTRADICTS)
     near = np.hypot(doubted.cloud.map_x_m - 20.0, doubted.cloud.y_m - 2.0) < 2.5
@@ -183,7 +176,7 @@ def test_a_near_radio_range_moves_a_doubted_cloud_about_the_teammate_and_a_far_o
 
 
 def test_a_doubted_cloud_moves_to_the_teammate_after_a_tap() -> None:
-    doubted = filter_at(4.0, 7.5, 0.4)
+    doubted = filter_at(4.0, 7.5, right=0.4)
     assert doubted.meet(FAR) is MeetingEffect.MOVED
     mean = doubted.cloud.weight @ np.column_stack([doubted.cloud.map_x_m, doubted.cloud.y_m])
     assert mean == pytest.approx([20.0, 2.0], abs=0.1)
@@ -205,7 +198,7 @@ def test_an_unknown_start_is_found_by_a_meeting() -> None:
     Meeting("kim", "lost", 4.0, 5.0, 0, 0.01, 0.0, 0.01), Meeting("kim", "uncertain", 4.0, 5.0, 0, 9.0, 0.0, 9.0),
 ])  # fmt: skip
 def test_a_teammate_without_a_place_says_nothing(met: Meeting) -> None:
-    doubted = filter_at(4.0, 7.5, 0.4)
+    doubted = filter_at(4.0, 7.5, right=0.4)
     before = doubted.cloud.log_weight.copy()
     assert doubted.meet(met) is MeetingEffect.EMPTY
     assert np.array_equal(doubted.cloud.log_weight, before)

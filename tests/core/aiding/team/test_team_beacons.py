@@ -10,30 +10,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aiding.team.two_wearers import BUILDING, PLAN, Two, told, two_wearers
+from aiding.team.two_wearers import BUILDING, Two, filter_at, told, two_wearers
 from echostep.aiding import MOST_TEAMMATES, AidedFilter, MeetingEffect, MeetingQueue, TeamBeaconMap
 from echostep.aiding.team.meeting import Meeting
 from echostep.aiding.team.meeting_memory import RENEWED_M, MeetingMemory
 from echostep.board.gateway import BeaconReading
 from echostep.localization import Start, digest
-from echostep.localization.belief import Belief
 from echostep.path import Odometer
-from echostep.plan import Pose
 from echostep.ports.chunks import Chunk
 from echostep.ports.people.team_beacons import MOST_SHARED, TEAM_BEACONS, SharedBeacon, parse_team_beacons
 from echostep.tracker import Tracker
+from walks import PLAN
 
 BEACON = SharedBeacon(7, 4.0, 7.5, 0, 0.01, 0.0, 0.01)
 
 
 def a_range(range_m: float, number: int = 7, name: str = "kim") -> Meeting:
     return Meeting(name, "uncertain", 4.0, 7.5, 0, 0.01, 0.0, 0.01, range_m=range_m, range_sd_m=0.4, beacon=number)
-
-
-def filter_at(x_m: float, y_m: float, sd_m: float, right: float = 0.99) -> AidedFilter:
-    made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
-    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
-    return made
 
 
 def spread_along(f: AidedFilter) -> float:

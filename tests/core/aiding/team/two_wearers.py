@@ -9,8 +9,10 @@ from functools import cache
 
 import numpy as np
 
-from beacons.beacon_walk import SEED, demo, heard, merged
+from beacons.beacon_walk import SEED, heard, merged
+from echostep.aiding import AidedFilter
 from echostep.localization import Building, Estimate, Start
+from echostep.localization.belief import Belief
 from echostep.plan import Pose
 from echostep.ports.chunks import Chunk, portion_of
 from echostep.ports.people.team_beacons import TEAM_BEACONS, SharedBeacon, TeamBeacons
@@ -19,14 +21,21 @@ from echostep.walls.level_sheet import lay_out_levels
 from echostep_simulation.devices.beacon_gateway import lay_beacons
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.scenario import Scenario
+from walks import PLAN
 
-PLAN = demo()
 LAID_OUT = lay_out_levels(PLAN)
 BUILDING = Building(LAID_OUT.walls, LAID_OUT.sheet)
 
 
 def told(*beacons: SharedBeacon, name: str = "kim") -> TeamBeacons:
     return TeamBeacons(1, name, "0000beac", PLAN.digest, beacons)
+
+
+def filter_at(x_m: float, y_m: float, sd_m: float = 0.15, right: float = 0.99) -> AidedFilter:
+    """A filter whose cloud is about a place, and right with this probability."""
+    made = AidedFilter(BUILDING, Start(Pose(x_m, y_m, 0.0), sd_m), 0.0, np.random.default_rng(3))
+    made.belief = Belief(made.belief.tracked.cloud, right, 1.0)
+    return made
 
 
 @dataclass
