@@ -10,14 +10,7 @@ import pytest
 
 from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoSettings
-from echostep.echoes.unplanned import (
-    BIN_M,
-    Background,
-    LastWall,
-    PlacedPings,
-    RangeMemory,
-    UnplannedDensities,
-)
+from echostep.echoes.unplanned import BIN_M, Background, LastWall, PlacedPings, RangeMemory, UnplannedDensities
 from echostep.localization import FilterSettings
 from echostep.localization.belief import TEMPER
 from echostep.localization.settings import UNPLANNED_DOOR, with_plan_error
