@@ -4,8 +4,9 @@
 In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are notified of each. Owns
 the options.
 
-A *kernel* is called from Python; a *part* is called by kernels and other parts alone. A part has no wrapper for Python, which is a fifth of the work
-of compiling, and none of its versions is made for one constant: numba makes them while it still takes `k = 0` before a loop for the type of `k`.
+A *kernel* is called from Python; a *part* is called by kernels and other parts alone. For a kernel that calls it, a kernel is a part, too. A part has
+no wrapper for Python, which is a fifth of the work of compiling, and none of its versions is made for one constant: numba makes them while it still
+takes `k = 0` before a loop for the type of `k`.
 
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
 than their work: a lean kernel counts none, so it returns numbers or tuples of numbers and makes no arrays. numba has no public option for this.
@@ -30,7 +31,8 @@ from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.extending import models, register_model, typeof_impl
+from numba.core.registry import CPUDispatcher
+from numba.extending import models, register_model
 from numba.np import linalg
 
 from echostep.kernel_cache import cache_folder, on_compiling, tell
@@ -48,17 +50,17 @@ UNWRITTEN = "compiled kernels cannot be kept"
 
 def kernel(function: Function) -> Function:
     """A kernel that may make arrays, except when a lean kernel calls it: then it is compiled as lean as its caller."""
-    return _compiled(function, _KERNEL)
+    return _kernel(function, {})
 
 
 def lean_kernel(function: Function) -> Function:
     """A kernel that makes no arrays and counts no references to the arrays that it is given."""
-    return _compiled(function, _KERNEL | _LEAN)
+    return _kernel(function, _LEAN)
 
 
 def inline_kernel(function: Function) -> Function:
     """A kernel that the compiler copies into each kernel that calls it."""
-    return _compiled(function, _KERNEL | _INLINE)
+    return _kernel(function, _INLINE)
 
 
 def part(function: Function) -> Function:
@@ -94,6 +96,8 @@ class _Part:
 
     def __call__(self, *_arguments: object) -> None:
         raise TypeError(f"{self.py_func.__qualname__} is a part of kernels: Python cannot call it")
+
+    _numba_type_ = property(lambda self: _PartType(self.dispatcher))
 
 
 class _PartLibrary(JITCodeLibrary):
@@ -132,13 +136,21 @@ class _PartType(types.Dispatcher):
 register_model(_PartType)(models.OpaqueModel)
 
 
-@typeof_impl.register(_Part)
-def _type_of_part(value: _Part, _context: object) -> _PartType:
-    return _PartType(value.dispatcher)
+class _Kernel(CPUDispatcher):
+    """A kernel as Python calls it; kernels that call it take its `part`: one version for constants, and nothing that only Python needs."""
+
+    part: _Part
+    _numba_type_ = property(lambda self: self.part._numba_type_)
 
 
 # The kernel that calls it is cached with it
 _PART: dict[str, Any] = {**_KERNEL, "no_cpython_wrapper": True, "cache": False, "pipeline_class": _PartCompiler}
+
+
+def _kernel(function: Function, options: dict[str, Any]) -> Function:
+    compiled: Any = _compiled(function, _KERNEL | options)
+    compiled.__class__, compiled.part = _Kernel, _Part(function, _PART | options)
+    return cast("Function", compiled)
 
 
 def _part(function: Function, options: dict[str, Any]) -> Function:

@@ -20,14 +20,7 @@ from echostep.beacons.beliefs import (
     set_beliefs,
 )
 from echostep.beacons.model import BeaconSettings, beacon_model
-from echostep.beacons.slam import (
-    CLOUD_FIT,
-    SUSPECT,
-    TIMES_MOVED,
-    initial_health,
-    reweight,
-    update_by_measurement,
-)
+from echostep.beacons.slam import CLOUD_FIT, SUSPECT, TIMES_MOVED, initial_health, reweight, update_by_measurement
 from echostep.beacons.step import Beacons, no_waiting, update_by_reading
 from echostep.elementary import wrap_angle
 from echostep.particles.arrays import ParticleArrays

@@ -11,13 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from echostep.arrays import Floats
-from echostep.beacons.beliefs import (
-    BeaconBeliefs,
-    BeaconMeasurement,
-    empty_beliefs,
-    moments,
-    place_covariance,
-)
+from echostep.beacons.beliefs import BeaconBeliefs, BeaconMeasurement, empty_beliefs, moments, place_covariance
 from echostep.beacons.initialisation import locate_beacon
 from echostep.beacons.model import BeaconSettings, beacon_model
 from echostep.beacons.slam import (

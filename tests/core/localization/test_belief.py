@@ -71,10 +71,7 @@ steps = st.lists(
 def test_probabilities_are_those_without_logarithms(
     prior: float, fits: float, taken: list[tuple[str, float, float]]
 ) -> None:
-    belief, naive = (
-        Belief(no_cloud(), prior, fits),
-        NaiveBelief(prior, fits, {THIS: HERE_M, ANOTHER: ANOTHER_M}),
-    )
+    belief, naive = (Belief(no_cloud(), prior, fits), NaiveBelief(prior, fits, {THIS: HERE_M, ANOTHER: ANOTHER_M}))
     for name, one, other in taken:
         if name == "weigh":
             for each, log_ratio in zip(belief.clouds, (one, other), strict=False):

@@ -23,14 +23,7 @@ from echostep.particles.arrays import Move, ParticleArrays
 from echostep.plan import ANY_LEVEL, Connector, Level, Plan, Pose
 from echostep.ports.chunks import MTX, Chunk, portion_of
 from echostep.tracker import Tracker
-from echostep.walls.level_sheet import (
-    LevelSheet,
-    connector_at,
-    lay_out_levels,
-    level_of,
-    level_sheet_of,
-    nearest_level,
-)
+from echostep.walls.level_sheet import LevelSheet, connector_at, lay_out_levels, level_of, level_sheet_of, nearest_level
 from echostep_simulation.devices.board import PythonBoard
 from echostep_simulation.people.walker import Person, Waypoint, walk
 from echostep_simulation.scenario import Scenario

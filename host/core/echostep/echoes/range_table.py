@@ -16,13 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from echostep.arrays import Floats, Int32s
-from echostep.echoes.likelihood import EchoModel, EchoSettings, detection
-from echostep.jit import kernel, lean_kernel
+from echostep.arrays import Floats, Int32s, Ints
+from echostep.echoes.likelihood import SURE_COS, EchoModel, EchoSettings, detection
+from echostep.jit import inline_part, kernel, lean_kernel
 from echostep.particles.arrays import PingBatch
-from echostep.walls.echo_sources import Walls, echo_sources, one_receiver
+from echostep.walls.echo_sources import Walls, list_sources, unit_at
 from echostep.walls.floor import CELL_M, Floor
-from echostep.walls.index import WallIndex
+from echostep.walls.index import EAR_REACH_M, TILE_M, WallIndex
+from echostep.walls.source_blocks import BLOCK, DISTANCE, FREE, KIND, OFF_AXIS, new_block, set_receiver
 
 # Assumed, not measured.
 SECTORS = 24  # of 15 degrees
@@ -43,9 +44,11 @@ MISSED, QUIET, HIDDEN, HIDDEN_QUIET = (0.02, 0.1), (0.3, 0.8), (0.1, 0.2), (0.1,
 USUAL_SILENT = 1.0 - EchoSettings().stray
 MOST_QUIET = 0.95
 AROUND = 2  # cells about the floor, at its walls, that share the nearest row
+HEARD_M, UNHEARD = FREE, FREE + BLOCK  # more columns of a block
 UNKNOWN = -1  # no row: outside the building
 USED_M = 0.25  # way of a view between two pings of one ranger that are used: a cell of the table
 INDEPENDENT_M = 0.8  # path over which the pings of one ranger have the information of one ping: walls continue
+Entries = np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 
 
 class RangeTable(NamedTuple):
@@ -57,7 +60,7 @@ class RangeTable(NamedTuple):
     x0_m: float
     y0_m: float
     row: Int32s
-    expected: np.ndarray[tuple[int, int], np.dtype[np.uint16]]
+    expected: Entries
 
 
 class TablePing(NamedTuple):
@@ -80,8 +83,21 @@ def range_table_of(walls: Walls, floor: Floor, model: EchoModel) -> RangeTable:
     row[line, column] = np.arange(len(line))
     for _ in range(AROUND):
         row = _grown(row)
-    expected = _expected(floor.x_m, floor.y_m, walls.near(floor.x_m, floor.y_m), model)
+    index, expected = walls.near(floor.x_m, floor.y_m), np.empty((len(line), SECTORS), np.uint16)
+    tile = np.floor((floor.x_m - index.x0_m) / TILE_M) + index.columns * np.floor((floor.y_m - index.y0_m) / TILE_M)
+    order = np.argsort(tile, kind="stable")
+    first = np.flatnonzero(np.diff(tile[order], prepend=-1.0, append=-1.0))
+    expected[order] = _expected(floor.x_m[order], floor.y_m[order], first, index, model)
     return RangeTable(x0, y0, row, expected)
+
+
+def _grown(row: Int32s) -> Int32s:
+    """The grid with each unknown cell that has a known neighbour given that neighbour's row; cells at its edge are unknown."""
+    grown = row.copy()
+    for by, axis in ((-1, 0), (1, 0), (-1, 1), (1, 1)):
+        beside = np.roll(row, by, axis)
+        np.copyto(grown, beside, where=(row == UNKNOWN) & (beside != UNKNOWN))
+    return grown
 
 
 @lean_kernel
@@ -114,40 +130,36 @@ def log_densities(ping: TablePing, model: EchoModel, table: Floats) -> None:
 
 
 @kernel
-def _expected(
-    x: Floats, y: Floats, walls: WallIndex, model: EchoModel
-) -> np.ndarray[tuple[int, int], np.dtype[np.uint16]]:
-    """The entries by cell and sector: the range up to which sources are detected with probability LIKELY, and the probability that any is."""
-    block, distance_m, off_axis_rad, kind = one_receiver()
-    expected = np.zeros((len(x), SECTORS), np.uint16)
-    for i in range(len(x)):
+def _expected(x: Floats, y: Floats, first: Ints, walls: WallIndex, model: EchoModel) -> Entries:
+    """The entries by cell and sector; the cells first[k] to first[k + 1] are of one tile, 25 at most, and traced together as one block."""
+    block, expected = new_block(), np.zeros((len(x), SECTORS), np.uint16)
+    for k in range(len(first) - 1):
+        begin, count = first[k], first[k + 1] - first[k]
         for s in range(SECTORS):
             axis = 2.0 * math.pi * (s + 0.5) / SECTORS
-            count = echo_sources(x[i], y[i], axis, walls, block)
-            missed, entry = 1.0, 0
-            for k in range(count):
-                missed *= 1.0 - detection(distance_m[k], off_axis_rad[k], kind[k], model)
-                if entry == 0 and missed < 1.0 - LIKELY:
-                    entry = max(min(int(distance_m[k] / UNIT_M + 0.5), RANGES - 1), 1)
-            if entry > 0:
-                expected[i, s] = entry + RANGES * min(int((1.0 - missed) * CHANCES), CHANCES - 1)
+            for i in range(count):
+                set_receiver(block, i, x[begin + i], y[begin + i], math.cos(axis), math.sin(axis))
+            unit = unit_at(x[begin], y[begin], axis, walls)
+            longest = list_sources(count, unit, walls, (model.sure_m, SURE_COS, EAR_REACH_M), block)
+            _write_entries(count, longest, model, block, expected[begin : begin + count, s])
     return expected
 
 
-@kernel
-def _grown(row: Int32s) -> Int32s:
-    """The grid with each unknown cell that has a known neighbour given that neighbour's row."""
-    rows, columns = row.shape
-    grown = row.copy()
-    for r in range(rows):
-        for c in range(columns):
-            if row[r, c] != UNKNOWN:
-                continue
-            for d in range(4):
-                j, i = r + (d == 0) - (d == 1), c + (d == 2) - (d == 3)
-                if 0 <= j < rows and 0 <= i < columns and row[j, i] != UNKNOWN:
-                    grown[r, c] = row[j, i]
-    return grown
+@inline_part
+def _write_entries(count: int, longest: int, model: EchoModel, block: Floats, entries: Entries) -> None:
+    """For each receiver: the range up to which sources are detected with probability LIKELY, and the probability that any is."""
+    for i in range(count):
+        block[HEARD_M + i], block[UNHEARD + i] = 0.0, 1.0
+    for source in range(longest):
+        for i in range(count):
+            at = source * BLOCK + i
+            block[UNHEARD + i] *= 1.0 - detection(block[DISTANCE + at], block[OFF_AXIS + at], block[KIND + at], model)
+            is_first = block[HEARD_M + i] == 0.0 and block[UNHEARD + i] < 1.0 - LIKELY
+            block[HEARD_M + i] = block[DISTANCE + at] if is_first else block[HEARD_M + i]
+    for i in range(count):
+        entry = max(min(int(block[HEARD_M + i] / UNIT_M + 0.5), RANGES - 1), 1)
+        entry += RANGES * min(int((1.0 - block[UNHEARD + i]) * CHANCES), CHANCES - 1)
+        entries[i] = entry if block[HEARD_M + i] > 0.0 else 0
 
 
 class TablePings:

@@ -65,4 +65,4 @@ def feel_push(s: ZuptState, nav: Nav, force: Floats, gyro: Floats, dt: float) ->
         gravity[i] += gain * (force[i] - gravity[i])
         v[i] += dt * (force[i] - gravity[i]) - gain * v[i]
     level = ins.dot(v, v) - ins.dot(v, gravity) ** 2 / ins.dot(gravity, gravity)
-    s.pushed = max(s.pushed, int(s.rest_s > 0.0 and level > PUSHED_M_S**2))
+    s.pushed = 1 if s.rest_s > 0.0 and level > PUSHED_M_S**2 else s.pushed

@@ -229,7 +229,7 @@ def _update_if_resting(s: ZuptState, nav: Nav, window: SampleWindow, sample: Imu
             return False
         s.forced += 1
         east, north, _ = ins.difference(nav.velocity, expected)
-        s.pushed = max(s.pushed, int(east * east + north * north > unrest.PUSHED_M_S**2))
+        s.pushed = 1 if east * east + north * north > unrest.PUSHED_M_S**2 else s.pushed
         stance.inflate_covariance(nav, (level + vertical) / stance.GATE)
     else:
         unrest.accumulate(s, nav, sample.gyro, level, dt)

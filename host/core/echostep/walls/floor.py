@@ -73,9 +73,9 @@ def walkable_floor(walls: Floats) -> Floor:
     if not inside.any():
         mark_near_walls(cells, HALL_M / CELL_M, inside)
         inside &= ~blocked
-    row, column = np.nonzero(inside)
-    enclosed = in_sight[row, column] >= ENCLOSED * DIRECTIONS
-    return Floor(low[0] + (column + 0.5) * CELL_M, low[1] + (row + 0.5) * CELL_M, enclosed)
+    places = (low[k] + (np.arange(count) + 0.5) * CELL_M for k, count in enumerate((columns, rows)))
+    x_m, y_m = (v[inside] for v in np.meshgrid(*places, copy=False))
+    return Floor(x_m, y_m, in_sight[inside] >= ENCLOSED * DIRECTIONS)
 
 
 @kernel
@@ -152,17 +152,16 @@ class Indoors:
 
 def indoors(floor: Floor) -> Indoors | None:
     """The cells of a floor that walls enclose, and those under adjacent walls; None if walls enclose none."""
-    x_m, y_m = floor.x_m[floor.enclosed], floor.y_m[floor.enclosed]
-    return inside_grid(x_m, y_m) if len(x_m) else None
+    return inside_grid(floor.x_m, floor.y_m, floor.enclosed) if floor.enclosed.any() else None
 
 
-def inside_grid(x_m: Floats, y_m: Floats) -> Indoors:
-    """The grid of cells with these centres (n,), n > 0, and of the cells under adjacent walls."""
+def inside_grid(x_m: Floats, y_m: Floats, are_inside: Bools | bool = True) -> Indoors:
+    """The grid of the cells with these centres (n,), n > 0: which of them are inside, all by default, and the cells under adjacent walls."""
     margin = WALL_CELLS + 1
     west_m, south_m = (float(v.min()) - (margin + 0.5) * CELL_M for v in (x_m, y_m))
-    column, row = (np.rint((v - low) / CELL_M - 0.5).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))
+    column, row = (((v - low) / CELL_M).astype(np.int64) for v, low in ((x_m, west_m), (y_m, south_m)))
     inside = np.zeros((int(row.max()) + margin + 1, int(column.max()) + margin + 1), np.bool_)
-    inside[row, column] = True
-    for axis in (0, 1):  # the margin holds what goes round
-        inside = np.logical_or.reduce([np.roll(inside, by, axis) for by in range(-WALL_CELLS, WALL_CELLS + 1)])
+    inside[row, column] = are_inside
+    for axis in WALL_CELLS * (0, 1):  # the margin holds what goes round
+        inside = inside | np.roll(inside, 1, axis) | np.roll(inside, -1, axis)
     return Indoors(west_m, south_m, inside)

@@ -113,13 +113,9 @@ class FrameReader:
         return [Frame(mid, frames.stream[body : body + length].tobytes(), bus) for bus, mid, body, length in rows]
 
 
-@kernel
 def copy_payloads(stream: Octets, begin: Ints, length: int) -> Octets:
     """Copy of the `length` bytes that follow each index of `begin` (n,), as rows (n, length)."""
-    rows = np.empty((len(begin), length), np.uint8)
-    for k in range(len(begin)):
-        rows[k] = stream[begin[k] : begin[k] + length]
-    return rows
+    return stream[begin[:, np.newaxis] + np.arange(length)]
 
 
 @kernel

@@ -127,10 +127,7 @@ def felt(walk: Course) -> tuple[Floats, Floats]:
 
 
 def samples(
-    walk: Course,
-    rate_hz: int,
-    mounting: Floats | None = None,
-    rng: np.random.Generator | None = None,
+    walk: Course, rate_hz: int, mounting: Floats | None = None, rng: np.random.Generator | None = None
 ) -> tuple[Floats, Floats, Floats]:
     """t_s (m,), accel and gyro (m, 3): means over each interval, as a sensor gives them; with an MTx's noise and biases given a generator."""
     every = RATE_HZ // rate_hz

@@ -13,14 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echostep.localization import (
-    Building,
-    Estimate,
-    FilterSettings,
-    MapFilter,
-    Start,
-    TrackStatus,
-)
+from echostep.localization import Building, Estimate, FilterSettings, MapFilter, Start, TrackStatus
 from echostep.path import MeasuredSegment
 from echostep.plan import Plan
 from echostep.walls.level_sheet import lay_out_levels

@@ -50,11 +50,7 @@ def grid_table(walls: Floats) -> GridTable:
     axis = np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS)
     count = len(x)
     sources = known_pings(
-        Walls(walls),
-        np.repeat(x, HEADINGS),
-        np.repeat(y, HEADINGS),
-        np.tile(axis, count),
-        np.zeros(count * HEADINGS),
+        Walls(walls), np.repeat(x, HEADINGS), np.repeat(y, HEADINGS), np.tile(axis, count), np.zeros(count * HEADINGS)
     )
     return GridTable(x, y, sources)
 

@@ -16,10 +16,7 @@ from echostep.localization.cloud_estimate import estimate_of
 from echostep.localization.particles.cloud import Cloud, cloud_about
 from echostep.particles.arrays import Move, PingBatch
 from echostep.particles.ellipse import ellipse95
-from echostep.particles.kernels import (
-    effective_size,
-    systematic,
-)
+from echostep.particles.kernels import effective_size, systematic
 from echostep.plan import Pose
 from echostep.walls.echo_sources import Walls
 from echostep.walls.tile_points import CORNER, EDGE

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from echostep.arrays import Floats, Int32s, Ints
-from echostep.echoes.range_table import UNKNOWN, RangeTable
+from echostep.echoes.range_table import UNKNOWN, Entries, RangeTable
 from echostep.height.levels import UpperLevels
 from echostep.jit import kernel
 from echostep.walls.floor import CELL_M
@@ -25,7 +25,6 @@ NO_CONNECTOR = -1
 
 Bytes = np.ndarray[tuple[int], np.dtype[np.uint8]]
 Shorts = np.ndarray[tuple[int], np.dtype[np.int16]]
-Entries = np.ndarray[tuple[int, int], np.dtype[np.uint16]]
 
 
 class GridCells(NamedTuple):
