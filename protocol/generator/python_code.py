@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from generator.schema import FIXED_SEED, LICENCE, NOTICE, Field, Message, crc_seed, enumerations, schema_hash
 
+LINE = 120  # characters, as ruff is told
+
 
 def python_code(messages: list[Message]) -> str:
     """The whole module."""
@@ -130,12 +132,13 @@ def _rows(messages: list[Message]) -> list[str]:
     lines = ["", "ROWS: dict[int, np.dtype[np.void]] = {"]
     for m in messages:
         columns = [f'("{f.name}", "{f.wire.numpy_name}")' for f in m.fields]
-        if len(columns) > 1:
+        row = f"    0x{m.id:02X}: np.dtype([{', '.join(columns)}]),"
+        if len(row) <= LINE:
+            lines.append(row)
+        else:
             lines += [f"    0x{m.id:02X}: np.dtype(", "        ["]
             lines += [f"            {column}," for column in columns]
             lines += ["        ]", "    ),"]
-        else:
-            lines.append(f"    0x{m.id:02X}: np.dtype([{', '.join(columns)}]),")
     return [*lines, "}"]
 
 

@@ -994,41 +994,11 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("reset_cause", "u1"),
         ]
     ),
-    0x02: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("ranger", "u1"),
-            ("outcome", "u1"),
-            ("time_of_flight_us", "<u2"),
-        ]
-    ),
-    0x03: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("thigh", "<i2"),
-            ("calf", "<i2"),
-            ("belt", "<i2"),
-        ]
-    ),
-    0x04: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("pressure", "<u4"),
-            ("temperature", "<i2"),
-        ]
-    ),
-    0x05: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("bearing", "<u2"),
-        ]
-    ),
-    0x06: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("edge", "<u2"),
-        ]
-    ),
+    0x02: np.dtype([("ticks", "<u4"), ("ranger", "u1"), ("outcome", "u1"), ("time_of_flight_us", "<u2")]),
+    0x03: np.dtype([("ticks", "<u4"), ("thigh", "<i2"), ("calf", "<i2"), ("belt", "<i2")]),
+    0x04: np.dtype([("ticks", "<u4"), ("pressure", "<u4"), ("temperature", "<i2")]),
+    0x05: np.dtype([("ticks", "<u4"), ("bearing", "<u2")]),
+    0x06: np.dtype([("ticks", "<u4"), ("edge", "<u2")]),
     0x07: np.dtype(
         [
             ("ticks", "<u4"),
@@ -1059,12 +1029,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("more_healthy", "u1"),
         ]
     ),
-    0x08: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("token", "<u2"),
-        ]
-    ),
+    0x08: np.dtype([("ticks", "<u4"), ("token", "<u2")]),
     0x09: np.dtype(
         [
             ("ticks", "<u4"),
@@ -1143,14 +1108,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("belt_acceleration_z", "<i2"),
         ]
     ),
-    0x0E: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("x", "<i2"),
-            ("y", "<i2"),
-            ("z", "<i2"),
-        ]
-    ),
+    0x0E: np.dtype([("ticks", "<u4"), ("x", "<i2"), ("y", "<i2"), ("z", "<i2")]),
     0x0F: np.dtype(
         [
             ("ticks", "<u4"),
@@ -1184,14 +1142,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
             ("scl_ones", "u1"),
         ]
     ),
-    0x12: np.dtype(
-        [
-            ("ticks", "<u4"),
-            ("longest_turn", "<u2"),
-            ("longest_latency", "<u2"),
-            ("ranging_cycle", "<u2"),
-        ]
-    ),
+    0x12: np.dtype([("ticks", "<u4"), ("longest_turn", "<u2"), ("longest_latency", "<u2"), ("ranging_cycle", "<u2")]),
     0x81: np.dtype([]),
     0x82: np.dtype([("token", "<u2")]),
     0x83: np.dtype(
@@ -1205,12 +1156,7 @@ ROWS: dict[int, np.dtype[np.void]] = {
         ]
     ),
     0x84: np.dtype([]),
-    0x85: np.dtype(
-        [
-            ("reports", "u1"),
-            ("more_reports", "u1"),
-        ]
-    ),
+    0x85: np.dtype([("reports", "u1"), ("more_reports", "u1")]),
     0x20: np.dtype(
         [
             ("gateway_ms", "<u4"),

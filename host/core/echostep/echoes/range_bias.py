@@ -64,11 +64,7 @@ class RangeBias:
     ) -> None:
         """Learn from corrected pings on a move, at whose end the particles (n,) with these weights are now."""
         rest = 1.0 - pings.share
-        x, y, turn = (
-            dot(weight, cloud.x_m),
-            dot(weight, cloud.y_m),
-            mean_angle(cloud.turn_rad, weight),
-        )
+        x, y, turn = dot(weight, cloud.x_m), dot(weight, cloud.y_m), mean_angle(cloud.turn_rad, weight)
         c, s = math.cos(turn), math.sin(turn)
         place_m = (
             x - rest * (c * move.dx_m - s * move.dy_m),
@@ -76,11 +72,7 @@ class RangeBias:
             pings.axis_rad + turn,
         )
         dx, dy = cloud.x_m - x, cloud.y_m - y
-        covariance_m2 = (
-            dot(weight, dx * dx),
-            dot(weight, dx * dy),
-            dot(weight, dy * dy),
-        )
+        covariance_m2 = dot(weight, dx * dx), dot(weight, dx * dy), dot(weight, dy * dy)
         self.learn(pings, place_m, covariance_m2, walls, model)
 
 
