@@ -87,14 +87,8 @@ def mean_angle(angle_rad: Floats, weight: Floats) -> float:
 @kernel
 def _of_each(x: Floats, function: int) -> Floats:
     """The function of each number (n,), by the C library: one kernel for all, so that one is loaded."""
-    y = np.empty(len(x))
-    for i in range(len(x)):
-        if function == _EXP:
-            y[i] = math.exp(x[i])
-        elif function == _LOG:
-            y[i] = math.log(x[i])
-        elif function == _SIN:
-            y[i] = math.sin(x[i])
-        else:
-            y[i] = math.cos(x[i])
-    return y
+    if function == _EXP:
+        return np.exp(x)
+    if function == _LOG:
+        return np.log(x)
+    return np.sin(x) if function == _SIN else np.cos(x)

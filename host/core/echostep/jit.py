@@ -4,9 +4,8 @@
 In: functions. Out: the same, compiled when first called and cached in the folder that `kernel_cache` names; the commands are notified of each. Owns
 the options.
 
-A *kernel* is called from Python; a *part* is called by kernels and other parts alone. For a kernel that calls it, a kernel is a part, too. A part has
-no wrapper for Python, which is a fifth of the work of compiling, and none of its versions is made for one constant: numba makes them while it still
-takes `k = 0` before a loop for the type of `k`.
+A *kernel* is called from Python, a *part* by kernels and other parts; a kernel that a kernel calls is a part there. A part has no wrapper for Python,
+a fifth of the work of compiling, and no version for one constant: numba makes these while it takes `k = 0` before a loop for the type of `k`.
 
 numba counts references to every array that one kernel hands to another, atomically. In kernels that run once per sample or particle that takes longer
 than their work: a lean kernel counts none, so it returns numbers or tuples of numbers and makes no arrays. numba has no public option for this.

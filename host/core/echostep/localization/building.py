@@ -12,7 +12,7 @@ from echostep.arrays import Floats
 from echostep.echoes.likelihood import EchoModel
 from echostep.echoes.range_table import range_table_of
 from echostep.echoes.unplanned import Background, background
-from echostep.elementary import dot, product
+from echostep.elementary import dot, weighted_covariance
 from echostep.height.levels import UpperLevels
 from echostep.localization.cloud_estimate import Moments
 from echostep.localization.grid.cells import GridCells, grid_cells
@@ -81,6 +81,5 @@ def _elsewhere(floor: Floor, sheet: LevelSheet | None) -> Moments | None:
     if not len(floor.x_m):
         return None
     x = floor.x_m if sheet is None else floor.x_m - level_of(floor.x_m, sheet) * sheet.pitch_m
-    away_m = np.array([x - x.mean(), floor.y_m - floor.y_m.mean()])
-    (xx, xy), (_, yy) = (product(away_m, away_m.T) / len(x)).tolist()
+    (xx, xy), (_, yy) = weighted_covariance(np.column_stack([x, floor.y_m]), np.full(len(x), 1.0 / len(x))).tolist()
     return Moments(float(x.mean()), float(floor.y_m.mean()), xx, xy, yy, 0.0, 0.0)

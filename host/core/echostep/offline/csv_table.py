@@ -15,7 +15,7 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, time
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TextIO, TypeVar
 
@@ -136,12 +136,10 @@ def number_of(text: str) -> float:
     """The number in a cell, or the seconds from 1970 to an ISO 8601 date and time (UTC without a zone), from midnight to a time; NaN if none."""
     if ":" in text:
         text = text.strip(' "\n')
-        with suppress(ValueError):
-            date = datetime.fromisoformat(text)
-            return date.replace(tzinfo=date.tzinfo or UTC).timestamp()
-        with suppress(ValueError):
-            at = time.fromisoformat(text)
-            return 3600.0 * at.hour + 60.0 * at.minute + at.second + 1e-6 * at.microsecond
+        for date in (text, f"1970-01-01 {text}"):
+            with suppress(ValueError):
+                at = datetime.fromisoformat(date)
+                return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
     try:
         number = float(text)
     except ValueError:
