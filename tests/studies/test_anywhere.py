@@ -261,6 +261,10 @@ def test_changed_plans() -> None:
     mirrored, pose = plan_changes.mirrored(plan, Pose(2.0, 1.0, 0.0))
     assert (pose.x_m, pose.heading_rad) == (8.0, math.pi)
     assert sorted(map(tuple, np.abs(box(mirrored)).tolist()))[0] == (0.0, 0.0, 0.0, 4.0)
+    beside = box(plan_changes.beside_half_turn(plan, way, rng))
+    turned = 2.0 * np.array([10.0 + plan_changes.APART_M, 2.0]) - beside[4:].reshape(-1, 2, 2)
+    assert len(turned) == 3
+    assert all(any(np.allclose(wall, at) for at in ROOM.reshape(-1, 2, 2)) for wall in turned)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +316,7 @@ def test_the_command_writes_its_table_and_the_diagrams(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "stanford.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(("rows", "peers"), [("*", 0), ("kidnap/*", 0), ("*/amcl", 7), ("kidnap/lift/amcl", 1)])
+@pytest.mark.parametrize(("rows", "peers"), [("*", 0), ("kidnap/*", 0), ("*/amcl", 8), ("kidnap/lift/amcl", 1)])
 def test_the_peer_is_run_where_it_is_named(rows: str, peers: int) -> None:
     names = anywhere_study(None, rows).run.args[0]  # type: ignore[attr-defined]
     assert sum(name.endswith(PEER) for name in names) == peers
