@@ -93,7 +93,7 @@ def _likelihood(p: Particle, pings: PingBatch, k: int, m: EchoModel, walls: Floa
         density += answers * math.exp(-0.5 * ((range_m - away) / sd) ** 2) / (sd * math.sqrt(2.0 * math.pi))
         unheard -= answers
     density += unheard * float(pings.stray[k]) * 0.5 * (float(pings.alike[k]) + 1.0 / span_m)
-    planned = (1.0 - m.outlier) * density**power + m.outlier * (0.8 / span_m) ** power
+    planned = (1.0 - m.outlier) * max(density, 1e-12) ** power + m.outlier * (0.8 / span_m) ** power
     before = m.hidden + math.exp(-float(pings.travel_m[k]) / m.hidden_m) * (p.hidden[ranger] - m.hidden)
     likelihood = before * float(pings.unplanned[k]) + (1.0 - before) * planned
     p.hidden[ranger] = before * float(pings.unplanned[k]) / likelihood

@@ -222,7 +222,7 @@ def exponential(x: float) -> float:
 
 @inline_kernel
 def logarithm(x: float) -> float:
-    """Natural logarithm of a normal number above 0, error below 1e-9: 2 artanh((m - 1) / (m + 1)) as a series, 1/2 <= m^2 < 2. Of 0: -709."""
+    """Natural logarithm of a normal number above 0, error below 1e-9: the series of 2 artanh((m - 1) / (m + 1)) with 1/2 <= m^2 < 2."""
     bits = np.float64(x).view(np.int64) - HALF_ROOT
     exponent = np.int64((((bits >> 52) + BIAS) & 0x7FF) | WHOLE).view(np.float64) - (2.0**52 + BIAS)
     m = np.int64((bits & (2**52 - 1)) + HALF_ROOT).view(np.float64)

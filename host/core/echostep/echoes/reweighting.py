@@ -35,7 +35,7 @@ LEAST_TOP = 1e-100  # greatest weight below which all are rescaled: far from the
 # Places for particles of one unit that wait, shared by units; a factor that gives neighbouring tiles different ones
 CROWDS, SPREAD = 64, 11
 HIDDEN, UNHEARD, HIT, LIKELIHOOD = range(FREE, FREE + 4 * BLOCK, BLOCK)  # more columns of a block
-LEAST_COST = 1e-12  # share of a weight that a wall takes, so that it can be divided by where walls cost nothing
+LEAST_DENSITY = 1e-12  # of a range, so that its logarithm exists; at 1e-9 a ping weighs 2e-4 nats otherwise, at most 0.16 (simulated)
 
 
 class CloudModel(NamedTuple):
@@ -76,7 +76,7 @@ def propagate_and_reweight(
             if propagate(particles, arrays, piece, (until - done) / rest, noise, wall_factor, walls):
                 total, squares, top = weight_sums(arrays.weight)
                 lowest = min(lowest, top / top_before)
-                crossed = (1.0 - total / before) / max(1.0 - wall_factor, LEAST_COST)
+                crossed = (1.0 - total / before) / max(1.0 - wall_factor, LEAST_DENSITY)
                 passed += math.log(max(1.0 - crossed, wall_factor))
             done = until
         if k < len(pings.share):
@@ -167,7 +167,7 @@ def _weigh(count: int, longest: int, pings: PingBatch, k: int, model: EchoModel,
             )  # fmt: skip
     for i in range(count):
         density = planned_density(range_m, block[UNHEARD + i], block[HIT + i], stray, strays) + missed
-        planned = (1.0 - model.outlier) * exponential(power * logarithm(density)) + outlier
+        planned = (1.0 - model.outlier) * exponential(power * logarithm(max(density, LEAST_DENSITY))) + outlier
         before = model.hidden + persists * (block[HIDDEN + i] - model.hidden)
         by_hidden = before * unplanned
         block[LIKELIHOOD + i] = by_hidden + (1.0 - before) * planned
