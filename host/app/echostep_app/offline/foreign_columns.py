@@ -75,8 +75,7 @@ GAITMAP = _axes("a", "left_sensor.acc_{}", "xyz") | _axes("g", "left_sensor.gyr_
 SENSORLOG = {"t_s": "accelerometerTimestamp_sinceReboot(s)"} | _axes("a", "accelerometerAcceleration{}(G)")
 SENSORLOG_GYROS = ("gyroRotation{}(rad/s)", "motionRotationRate{}(rad/s)")
 PICOQUAKE = {"t_s": "count"} | _axes("a", "a_{}", "xyz") | _axes("g", "g_{}", "xyz")
-ARTEMIS_CLOCK, DAY_S = "rtcTime", 86_400  # hours, minutes and seconds of a day
-ARTEMIS = {"t_s": ARTEMIS_CLOCK} | _axes("a", "a{}") | _axes("g", "g{}")
+ARTEMIS = {"t_s": "rtcTime"} | _axes("a", "a{}") | _axes("g", "g{}")
 MSCL = _axes("a", "scaledAccel{}") | _axes("g", "scaledGyro{}")
 
 
@@ -205,8 +204,6 @@ def _counter(name: str, above: list[str], *, clocked: bool) -> tuple[float | Non
     """Counts a second and period of a column that counts samples or ticks; (None, ...) for a column of times."""
     if name == CLOCK:
         return DOT_CLOCK_HZ if _has(above, DOT) else MT_CLOCK_HZ, CLOCK_PERIOD
-    if name == ARTEMIS_CLOCK:
-        return 1.0, DAY_S
     if not COUNTERS.fullmatch(_letters(name)):
         return None, COUNTER_PERIOD
     rates = [float(found[1]) for line in above if (found := COUNTS_HZ.search(line))]

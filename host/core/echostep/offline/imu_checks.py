@@ -23,8 +23,8 @@ SENSOR_COLUMNS = 7  # time, force and rate; a magnetometer may follow
 
 # Assumed, all of them.
 REGULAR_SHARE = 0.01  # largest share of sorted times that follow each other within half a period
-# Of counters in microseconds, tenths of a millisecond, milliseconds
-WRAPS_S = 2**32 * 1e-6, 2**32 * 1e-4, 2**32 * 1e-3, 2**16 * 1e-3
+# Of counters in microseconds, tenths of a millisecond, milliseconds; of the time of day
+WRAPS_S = 2**32 * 1e-6, 2**32 * 1e-4, 2**32 * 1e-3, 2**16 * 1e-3, 86_400.0
 ROOM = 1.5  # periods between two neighbours, between which there is a place
 LATEST = 10.0  # periods, after which two exchanged parts do not follow each other
 MISSING_SHARE = 0.02  # share of missing samples that is reported
@@ -64,7 +64,7 @@ def is_filled(table: Floats) -> Bools:
 
 
 def unwrapped(t_s: Floats, period_s: float) -> Floats:
-    """The times (n,) of samples in such periods, with counters that wrap going on."""
+    """The times (n,) of samples in such periods, with counters and days that wrap going on."""
     for wrap_s in WRAPS_S:
         near_s = min(LATEST * period_s, 0.01 * wrap_s)
         t_s = t_s + wrap_s * np.cumsum(np.abs(np.diff(t_s, prepend=t_s[:1]) + wrap_s) < near_s)
