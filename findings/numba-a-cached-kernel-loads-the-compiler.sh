@@ -1,7 +1,7 @@
 #!/bin/sh
 # One would expect a kernel that numba finds in its cache (`cache=True`) to be loaded without what only a compiler needs.
 # The first one loaded imports the implementations of all functions that numba knows, and reads the kernel's bitcode besides its machine code.
-# It hurts whoever starts a program to run a few cached kernels: a tenth of a second and tens of megabytes before the first one returns.
+# It hurts programs that start to run a few cached kernels: a tenth of a second and tens of megabytes before the first one returns.
 # No option leaves it out.
 set -eu
 folder=$(mktemp -d)

@@ -137,8 +137,9 @@ def _expected(x: Floats, y: Floats, first: Ints, walls: WallIndex, model: EchoMo
         begin, count = first[k], first[k + 1] - first[k]
         for s in range(SECTORS):
             axis = 2.0 * math.pi * (s + 0.5) / SECTORS
+            ax, ay = math.cos(axis), math.sin(axis)
             for i in range(count):
-                set_receiver(block, i, x[begin + i], y[begin + i], math.cos(axis), math.sin(axis))
+                set_receiver(block, i, x[begin + i], y[begin + i], ax, ay)
             unit = unit_at(x[begin], y[begin], axis, walls)
             longest = list_sources(count, unit, walls, (model.sure_m, SURE_COS, EAR_REACH_M), block)
             _write_entries(count, longest, model, block, expected[begin : begin + count, s])

@@ -78,8 +78,7 @@ class RangeMemory:
 
     def densities(self, pings: PlacedPings) -> Floats:
         """Rows STRAY to LOG_BLURRED (6, k) for pings in order of time."""
-        anywhere = self._background.of(pings.range_m)
-        return remembered_densities(self._memory, pings, anywhere, self._blur_m, self._model)
+        return remembered_densities(self._memory, pings, self._background.of(pings.range_m), self._blur_m, self._model)
 
 
 @kernel

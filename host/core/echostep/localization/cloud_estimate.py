@@ -97,7 +97,7 @@ def estimate_of(
     if not rivals and places and places[0].probability > PROBABLE * right:
         m, region, share = _at_likeliest(places[0], m, cloud, walk_heading_rad, right)
     x, y, xx, xy, yy, east, north = m
-    spread = math.sqrt(max(-2.0 * math.log(min(max(math.hypot(east, north), EVEN), 1.0)), 0.0))
+    spread = math.sqrt(-2.0 * math.log(min(max(math.hypot(east, north), EVEN), 1.0)))
     away_m = _away_m(cloud, m)
     near, about = (right * dot(weight, _within(limit - away_m, map_sd_m)) for limit in (TRACKING_M, LOST_M))
     for each, probability in rivals:
